@@ -1,0 +1,94 @@
+"""Every error the package raises on purpose.
+
+Two families: `InputError` (what was given is wrong; the command line exits with status 2) and
+`ComputationError` (the input was right and the computation failed; exit status 1). A message says
+what is wrong, where, and how to mend it.
+"""
+
+
+class LieCodegenError(Exception):
+    """Base of all errors of this package."""
+
+
+class InputError(LieCodegenError, ValueError):
+    """What the caller gave is wrong; nothing was written."""
+
+
+class ExpressionError(InputError):
+    """A text is not in the closed grammar of numbers and formulas; names the column."""
+
+
+class GroupFileError(InputError):
+    """A group file cannot be used; names the file, the key and, in an entry, the column."""
+
+
+class IdentifierError(InputError):
+    """A name cannot be a C identifier, or is a keyword of C or C++."""
+
+
+class ShapeError(InputError):
+    """An array has the wrong shape or type of entry; names the argument."""
+
+
+class NotFiniteError(InputError):
+    """An argument holds NaN or infinity; names the argument."""
+
+
+class AlgebraError(InputError):
+    """The definition is not a Lie algebra."""
+
+
+class NotClosedError(AlgebraError):
+    """A commutator leaves the span of the basis; names the pair."""
+
+
+class DependentBasisError(AlgebraError):
+    """The basis matrices are linearly dependent; names the relation."""
+
+
+class JacobiError(AlgebraError):
+    """The Jacobi identity fails; names the triple."""
+
+
+class UnknownGroupError(InputError):
+    """No group of that name in the catalogue, and no such file."""
+
+
+class NotInAlgebraError(InputError):
+    """A matrix is not in the Lie algebra; says how far off it is."""
+
+
+class NotOnGroupError(InputError):
+    """A matrix is not on the group; says how far off it is."""
+
+
+class UncontrollableError(InputError):
+    """The controls do not generate the algebra; carries the growth vector."""
+
+
+class SteeringInputError(InputError):
+    """A steering task that cannot be posed as given; says what to do instead."""
+
+
+class OutputFolderError(InputError):
+    """A folder cannot be written, or holds files that are not ours."""
+
+
+class ComputationError(LieCodegenError, RuntimeError):
+    """The input was right and the computation failed."""
+
+
+class CompileError(ComputationError):
+    """The C compiler failed; carries the command and what it printed."""
+
+
+class ChartError(ComputationError):
+    """Wei-Norman coordinates reached the edge of their chart; names the time."""
+
+
+class SteeringError(ComputationError):
+    """The solver found no admissible manoeuvre; says what was tried."""
+
+
+class MissingDependencyError(ComputationError):
+    """An optional package is not installed; names the extra that brings it."""

@@ -1,0 +1,79 @@
+"""The kernel arithmetic over CasADi SX, and Kernel -> casadi.Function."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from lie_codegen.kernels.complex_scalar import Complex
+from lie_codegen.kernels.kernel import Kernel, Port
+
+
+class CasadiArithmetic:
+    """SX scalars; exact constants become the nearest doubles."""
+
+    def constant(self, value: Any) -> float:
+        return float(value)
+
+    sin = staticmethod(ca.sin)
+    cos = staticmethod(ca.cos)
+    tan = staticmethod(ca.tan)
+    exp = staticmethod(ca.exp)
+    expm1 = staticmethod(ca.expm1)
+    log = staticmethod(ca.log)
+    sqrt = staticmethod(ca.sqrt)
+    sinh = staticmethod(ca.sinh)
+    cosh = staticmethod(ca.cosh)
+    acos = staticmethod(ca.acos)
+    atan2 = staticmethod(ca.atan2)
+    fabs = staticmethod(ca.fabs)
+
+    def less(self, a: Any, b: Any) -> Any:
+        return ca.SX(a) < b
+
+    def where(self, condition: Any, then: Any, otherwise: Any) -> Any:
+        return ca.if_else(condition, then, otherwise)
+
+
+def function_of(kernel: Kernel) -> ca.Function:
+    """The kernel as a CasADi Function of dense column vectors.
+
+    Each port becomes one column vector of `port.size` entries in C order: row-major, complex entries as
+    interleaved (re, im). No transposition is left to do in C or in numpy.
+    """
+    symbols = [ca.SX.sym(port.name, port.size) for port in kernel.inputs]
+    arguments = [_unflatten(port, ca.vertsplit(symbol)) for port, symbol in zip(kernel.inputs, symbols, strict=True)]
+    results = kernel.evaluate(CasadiArithmetic(), *arguments)
+    flat = [
+        ca.densify(ca.vertcat(*[ca.SX(entry) for entry in flatten(port, value)]))
+        for port, value in zip(kernel.outputs, results, strict=True)
+    ]
+    function = ca.Function(
+        kernel.symbol, symbols, flat, [p.name for p in kernel.inputs], [p.name for p in kernel.outputs], {"cse": True}
+    )
+    return function
+
+
+def flatten(port: Port, value: Any) -> list[Any]:
+    """A nested port value as its flat C-order list of real scalars."""
+    if len(port.shape) == 0:
+        entries = [value]
+    elif len(port.shape) == 1:
+        entries = list(value)
+    else:
+        entries = [entry for row in value for entry in row]
+    if not port.is_complex:
+        return entries
+    return [part for entry in entries for part in (Complex.of(entry).re, Complex.of(entry).im)]
+
+
+def _unflatten(port: Port, entries: list[Any]) -> Any:
+    if port.is_complex:
+        entries = [Complex(re, im) for re, im in zip(entries[::2], entries[1::2], strict=True)]
+    if len(port.shape) == 0:
+        return entries[0]
+    if len(port.shape) == 1:
+        return entries
+    columns = port.shape[1]
+    return [entries[start : start + columns] for start in range(0, len(entries), columns)]
