@@ -38,7 +38,13 @@ class Arithmetic(Protocol):
 
     def cosh(self, x: Scalar) -> Scalar: ...
 
+    def tanh(self, x: Scalar) -> Scalar: ...
+
     def acos(self, x: Scalar) -> Scalar: ...
+
+    def asin(self, x: Scalar) -> Scalar: ...
+
+    def atan(self, x: Scalar) -> Scalar: ...
 
     def atan2(self, y: Scalar, x: Scalar) -> Scalar: ...
 
@@ -70,7 +76,10 @@ class FloatArithmetic:
     sqrt = staticmethod(math.sqrt)
     sinh = staticmethod(math.sinh)
     cosh = staticmethod(math.cosh)
+    tanh = staticmethod(math.tanh)
     acos = staticmethod(math.acos)
+    asin = staticmethod(math.asin)
+    atan = staticmethod(math.atan)
     atan2 = staticmethod(math.atan2)
     fabs = staticmethod(math.fabs)
 

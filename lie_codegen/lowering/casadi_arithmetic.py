@@ -25,7 +25,10 @@ class CasadiArithmetic:
     sqrt = staticmethod(ca.sqrt)
     sinh = staticmethod(ca.sinh)
     cosh = staticmethod(ca.cosh)
+    tanh = staticmethod(ca.tanh)
     acos = staticmethod(ca.acos)
+    asin = staticmethod(ca.asin)
+    atan = staticmethod(ca.atan)
     atan2 = staticmethod(ca.atan2)
     fabs = staticmethod(ca.fabs)
 

@@ -1,0 +1,143 @@
+"""LieAlgebra: exact structure constants, proved in the constructor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+import sympy as sp
+
+from lie_codegen.algebra.exact import Number
+from lie_codegen.errors import AlgebraError, InputError, JacobiError
+from lie_codegen.identifiers import check_identifier
+
+#: Sparse vector: basis index -> coefficient, no zeros.
+Sparse = Mapping[int, Number]
+
+
+@dataclass(frozen=True)
+class LieAlgebra:
+    """Real Lie algebra with basis A_1..A_n and [A_i, A_j] = sum_k c[i, j, k] A_k.
+
+    Attributes:
+        name: C identifier; it prefixes every generated symbol.
+        labels: (n,) basis names, in the order used by every vector and matrix.
+        table: for i < j, (i, j) -> {k: c[i, j, k]}, exact and without zeros; antisymmetry is built in.
+
+    Raises:
+        IdentifierError: if the name or a label cannot be a C identifier.
+        AlgebraError: if a label is repeated or an index is out of range.
+        JacobiError: if the Jacobi identity fails, naming the triple.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    table: Mapping[tuple[int, int], Sparse]
+
+    def __post_init__(self) -> None:
+        check_identifier(self.name, "name")
+        if not self.labels:
+            raise AlgebraError(f"{self.name}: a Lie algebra needs at least one basis element")
+        for label in self.labels:
+            check_identifier(label, f"{self.name}: label")
+        repeated = sorted({label for label in self.labels if self.labels.count(label) > 1})
+        if repeated:
+            raise AlgebraError(f"{self.name}: labels repeated: {', '.join(repeated)}; give each a name of its own")
+        for (i, j), row in self.table.items():
+            if not (0 <= i < j < self.dim) or any(not 0 <= k < self.dim for k in row):
+                raise AlgebraError(f"{self.name}: bracket ({i}, {j}) -> {dict(row)} is out of range")
+        self._check_jacobi()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.labels, frozenset((key, frozenset(row.items())) for key, row in self.table.items())))
+
+    @property
+    def dim(self) -> int:
+        """n, the number of basis elements."""
+        return len(self.labels)
+
+    @cached_property
+    def c(self) -> sp.ImmutableDenseNDimArray:
+        """(n, n, n) exact structure constants."""
+        n = self.dim
+        flat = [sp.S.Zero] * n**3
+        for i, j, k, value in self.constants():
+            flat[(i * n + j) * n + k] = value
+        return sp.ImmutableDenseNDimArray(flat, (n, n, n))
+
+    @cached_property
+    def structure_constants(self) -> np.ndarray:
+        """(n, n, n) structure constants as doubles."""
+        array = np.zeros((self.dim,) * 3)
+        for i, j, k, value in self.constants():
+            array[i, j, k] = float(value)
+        array.setflags(write=False)
+        return array
+
+    def constants(self) -> Iterator[tuple[int, int, int, Number]]:
+        """All nonzero (i, j, k, c[i, j, k]), both orders of i and j."""
+        for (i, j), row in self.table.items():
+            for k, value in row.items():
+                yield i, j, k, value
+                yield j, i, k, -value
+
+    def bracket(self, x: Sparse, y: Sparse) -> dict[int, Number]:
+        """[x, y] of two sparse exact vectors."""
+        result: dict[int, Number] = {}
+        for i, xi in x.items():
+            for j, yj in y.items():
+                if i == j:
+                    continue
+                sign, key = (1, (i, j)) if i < j else (-1, (j, i))
+                for k, value in self.table.get(key, {}).items():
+                    result[k] = result.get(k, sp.S.Zero) + sign * xi * yj * value
+        return {k: total for k, value in result.items() if (total := sp.expand(value)) != 0}
+
+    def index(self, label: str | int) -> int:
+        """The position of a basis element given by label or by position.
+
+        Raises:
+            InputError: if there is no such basis element.
+        """
+        if isinstance(label, str):
+            if label in self.labels:
+                return self.labels.index(label)
+            raise InputError(f"{self.name} has no basis element {label!r}; its labels are {', '.join(self.labels)}")
+        if isinstance(label, int | np.integer) and not isinstance(label, bool) and 0 <= label < self.dim:
+            return int(label)
+        raise InputError(f"{self.name}: {label!r} is neither a label nor an index from 0 to {self.dim - 1}")
+
+    def _check_jacobi(self) -> None:
+        one = sp.S.One
+        zero: dict[int, Number] = {}
+        inner = {key: dict(row) for key, row in self.table.items() if row}
+        for i, j, k in combinations(range(self.dim), 3):
+            pairs = ((i, j, k, 1), (j, k, i, 1), (i, k, j, -1))
+            defect = zero
+            for a, b, third, sign in pairs:
+                row = inner.get((a, b))
+                if row:
+                    defect = _add(defect, self.bracket(row, {third: sp.Integer(sign) * one}))
+            left = {m: total for m, value in defect.items() if (total := _simplified(value)) != 0}
+            if left:
+                names = self.labels
+                value = " + ".join(f"({coefficient}) {names[m]}" for m, coefficient in left.items())
+                raise JacobiError(
+                    f"{self.name}: the Jacobi identity fails for ({names[i]}, {names[j]}, {names[k]}): "
+                    f"[[{names[i]}, {names[j]}], {names[k]}] + cyclic = {value}, not 0; check these brackets"
+                )
+
+
+def _simplified(value: Number) -> Number:
+    """Zero if the number is zero, whatever radicals it is written in."""
+    return value if value.is_Rational else sp.radsimp(sp.expand(value)) if value.equals(0) is not True else sp.S.Zero
+
+
+def _add(x: Sparse, y: Sparse) -> dict[int, Number]:
+    total = dict(x)
+    for k, value in y.items():
+        total[k] = sp.expand(total.get(k, sp.S.Zero) + value)
+    return {k: value for k, value in total.items() if value != 0}

@@ -1,0 +1,134 @@
+"""MatrixGroup: a Lie algebra with a faithful matrix representation, and so a connected matrix group."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.algebra.constructions import permutation, reorder_algebra
+from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.errors import NotFiniteError, NotInAlgebraError, ShapeError
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class MatrixGroup:
+    """Connected matrix Lie group whose algebra has basis A_1..A_n.
+
+    Attributes:
+        algebra: exact structure constants.
+        exact_basis: (n) exact d x d matrices A_i, complex entries allowed.
+        units: (n) units of the components of an algebra vector, "" where there are none.
+        description: one line.
+    """
+
+    algebra: LieAlgebra
+    exact_basis: tuple[sp.ImmutableMatrix, ...]
+    units: tuple[str, ...]
+    description: str = field(default="", compare=False)
+
+    @property
+    def name(self) -> str:
+        """C identifier."""
+        return self.algebra.name
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """(n,) basis names."""
+        return self.algebra.labels
+
+    @property
+    def dim(self) -> int:
+        """n, the dimension of the group."""
+        return self.algebra.dim
+
+    @property
+    def degree(self) -> int:
+        """d, the size of the matrices."""
+        return int(self.exact_basis[0].rows)
+
+    @cached_property
+    def is_complex(self) -> bool:
+        """Whether a basis matrix has a complex entry."""
+        return any(entry.is_real is not True for matrix in self.exact_basis for entry in matrix.flat())
+
+    @cached_property
+    def basis(self) -> Array:
+        """(n, d, d) the matrices A_i as doubles (complex doubles for a complex group), read-only."""
+        kind = complex if self.is_complex else float
+        array = np.array([[[kind(entry) for entry in row] for row in m.tolist()] for m in self.exact_basis], dtype=kind)
+        array.setflags(write=False)
+        return array
+
+    @cached_property
+    def _coordinates(self) -> Array:
+        """(n, 2 d^2) left inverse of the map from coordinates to stacked real and imaginary parts."""
+        stacked = np.array([np.concatenate([m.real.ravel(), m.imag.ravel()]) for m in self.basis])
+        return np.linalg.pinv(stacked.T)
+
+    def hat(self, x: ArrayLike) -> Array:
+        """x^ = sum_i x_i A_i: (..., n) -> (..., d, d).
+
+        Raises:
+            ShapeError: if the last axis is not n.
+        """
+        vector = np.asarray(x, dtype=float)
+        if vector.ndim < 1 or vector.shape[-1] != self.dim:
+            raise ShapeError(f"{self.name}.hat: x has shape {vector.shape}; its last axis must be {self.dim}")
+        return np.tensordot(vector, self.basis, axes=(-1, 0))
+
+    def vee(self, A: ArrayLike) -> Array:
+        """The x with hat(x) = A: (..., d, d) -> (..., n).
+
+        Raises:
+            ShapeError: if the last two axes are not (d, d).
+            NotFiniteError: for NaN or infinity.
+            NotInAlgebraError: if A is not in the algebra to 1e-9 of its size.
+        """
+        matrix = np.asarray(A, dtype=complex)
+        d = self.degree
+        if matrix.shape[-2:] != (d, d):
+            raise ShapeError(f"{self.name}.vee: A has shape {matrix.shape}; its last axes must be ({d}, {d})")
+        if not np.all(np.isfinite(matrix)):
+            raise NotFiniteError(f"{self.name}.vee: A holds NaN or infinity")
+        x = self.project(matrix)
+        off = float(np.max(np.abs(self.hat(x) - matrix), initial=0.0))
+        if off > 1e-9 * max(1.0, float(np.max(np.abs(matrix), initial=0.0))):
+            raise NotInAlgebraError(
+                f"{self.name}.vee: A is not in the algebra; the nearest element of the span of "
+                f"{', '.join(self.labels)} differs by {off:.3g}"
+            )
+        return x
+
+    def project(self, A: ArrayLike) -> Array:
+        """Coordinates of the element of the algebra nearest to A (Frobenius): (..., d, d) -> (..., n)."""
+        matrix = np.asarray(A, dtype=complex)
+        flat = matrix.reshape(*matrix.shape[:-2], -1)
+        return np.concatenate([flat.real, flat.imag], axis=-1) @ self._coordinates.T
+
+    def reorder(self, labels: Sequence[str]) -> MatrixGroup:
+        """The same group with its basis in another order.
+
+        Raises:
+            InputError: if `labels` is not a permutation of the group's labels.
+        """
+        order = permutation(self.algebra, labels)
+        algebra = reorder_algebra(self.algebra, labels)
+        basis = tuple(self.exact_basis[i] for i in order)
+        return MatrixGroup(algebra, basis, tuple(self.units[i] for i in order), self.description)
+
+    @cached_property
+    def definition(self) -> str:
+        """Canonical text of everything the derived code depends on; equal texts give equal code."""
+        rows = [f"{label} [{unit}] = {matrix.tolist()}" for label, unit, matrix in self._rows()]
+        return "\n".join([self.name, self.description, *rows])
+
+    def _rows(self) -> Any:
+        return zip(self.labels, self.units, self.exact_basis, strict=True)
