@@ -74,6 +74,10 @@ class OutputFolderError(InputError):
     """A folder cannot be written, or holds files that are not ours."""
 
 
+class CodegenError(InputError):
+    """A kernel cannot become C as it is written; names the operation or the symbol."""
+
+
 class ComputationError(LieCodegenError, RuntimeError):
     """The input was right and the computation failed."""
 
@@ -92,3 +96,15 @@ class SteeringError(ComputationError):
 
 class MissingDependencyError(ComputationError):
     """An optional package is not installed; names the extra that brings it."""
+
+
+class CacheError(ComputationError):
+    """No folder could be found to build in; says which were tried."""
+
+
+class NoCompilerWarning(UserWarning):
+    """No C compiler was found: kernels are interpreted, with the same results, more slowly."""
+
+
+class CacheWarning(UserWarning):
+    """The cache folder cannot be used; what is built lives in a private temporary folder."""

@@ -1,0 +1,118 @@
+"""The closed table of CasADi's scalar operations, each with its C form.
+
+An operation missing here is refused by name: nothing is ever printed as something else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from lie_codegen.errors import CodegenError
+
+#: Operation -> C expression over double operands {0}, {1}, {2}. Every result is a double.
+C99_FORMS: Mapping[str, str] = {
+    "ASSIGN": "{0}",
+    "LIFT": "{0}",
+    "ADD": "{0} + {1}",
+    "SUB": "{0} - {1}",
+    "MUL": "{0} * {1}",
+    "DIV": "{0} / {1}",
+    "NEG": "-{0}",
+    "INV": "1.0 / {0}",
+    "TWICE": "2.0 * {0}",
+    "SQ": "{0} * {0}",
+    "POW": "pow({0}, {1})",
+    "CONSTPOW": "pow({0}, {1})",
+    "SQRT": "sqrt({0})",
+    "EXP": "exp({0})",
+    "EXPM1": "expm1({0})",
+    "LOG": "log({0})",
+    "LOG1P": "log1p({0})",
+    "SIN": "sin({0})",
+    "COS": "cos({0})",
+    "TAN": "tan({0})",
+    "ASIN": "asin({0})",
+    "ACOS": "acos({0})",
+    "ATAN": "atan({0})",
+    "ATAN2": "atan2({0}, {1})",
+    "SINH": "sinh({0})",
+    "COSH": "cosh({0})",
+    "TANH": "tanh({0})",
+    "ASINH": "asinh({0})",
+    "ACOSH": "acosh({0})",
+    "ATANH": "atanh({0})",
+    "ERF": "erf({0})",
+    "HYPOT": "hypot({0}, {1})",
+    "FABS": "fabs({0})",
+    "FLOOR": "floor({0})",
+    "CEIL": "ceil({0})",
+    "FMOD": "fmod({0}, {1})",
+    "REMAINDER": "remainder({0}, {1})",
+    "COPYSIGN": "copysign({0}, {1})",
+    "FMIN": "fmin({0}, {1})",
+    "FMAX": "fmax({0}, {1})",
+    "SIGN": "{0} < 0.0 ? -1.0 : ({0} > 0.0 ? 1.0 : {0})",
+    "LT": "(double)({0} < {1})",
+    "LE": "(double)({0} <= {1})",
+    "EQ": "(double)({0} == {1})",
+    "NE": "(double)({0} != {1})",
+    "NOT": "(double)({0} == 0.0)",
+    "AND": "(double)({0} != 0.0 && {1} != 0.0)",
+    "OR": "(double)({0} != 0.0 || {1} != 0.0)",
+    # A conditional, not a product: the branch not taken may be infinite or NaN.
+    "IF_ELSE_ZERO": "{0} != 0.0 ? {1} : 0.0",
+    "SELECT": "{0} != 0.0 ? {1} : {2}",
+}
+
+#: Names of <math.h> that the forms above and the literals use: no C parameter may hide them.
+MATH_NAMES = frozenset(
+    """pow sqrt exp expm1 log log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh erf hypot fabs
+    floor ceil fmod remainder copysign fmin fmax HUGE_VAL NAN INFINITY NULL I errno isnan isinf isfinite signbit
+    fpclassify isnormal math_errhandling memcpy assert complex imaginary bool unix linux""".split()
+)
+
+
+def c_literal(value: float) -> str:
+    """The shortest decimal that reads back as exactly `value`; a negative one in parentheses."""
+    if math.isnan(value):
+        return "(double)NAN"
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
+    text = repr(float(value))
+    return f"({text})" if text.startswith("-") else text
+
+
+@dataclass(frozen=True)
+class Target:
+    """A C dialect a tape can be printed in: scalar doubles, or later lanes of them.
+
+    Attributes:
+        type_name: C type of a temporary.
+        forms: operation -> expression, with {0}, {1}, {2} for the operands.
+        literal: a double as an operand.
+        load: expression of one entry of an input; {0} is the array, {1} the entry.
+    """
+
+    type_name: str
+    forms: Mapping[str, str]
+    literal: Callable[[float], str]
+    load: str = "{0}[{1}]"
+
+    def expression(self, op: str, operands: tuple[str, ...]) -> str:
+        """The C expression of one operation.
+
+        Raises:
+            CodegenError: the target has no form for it.
+        """
+        form = self.forms.get(op)
+        if form is None:
+            raise CodegenError(
+                f"operation {op} has no C form in the target {self.type_name}: write the kernel without it"
+            )
+        return form.format(*operands)
+
+
+#: Plain C99 with libm.
+C99 = Target("double", C99_FORMS, c_literal)

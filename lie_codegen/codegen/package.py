@@ -1,0 +1,175 @@
+"""Kernels -> the generated package as text: pure, the same bytes for the same kernels."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.codegen.opcodes import c_literal
+from lie_codegen.codegen.signature import Signature
+from lie_codegen.codegen.tape import Tape, tape_of
+from lie_codegen.codegen.templates import render
+from lie_codegen.codegen.vectors import TestVector, make_vectors
+from lie_codegen.codegen.views import PackageMetadata, PackageView, is_step, package_view
+from lie_codegen.codegen.write import GENERATOR, write_package
+from lie_codegen.errors import CodegenError
+from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernels.kernel import Kernel
+
+#: What example.c allows between its results and the vectors, relative to max(1, |expected|).
+TOLERANCE = 1e-11
+
+
+@dataclass(frozen=True)
+class LibrarySources:
+    """What the runtime compiles: one unit that includes the package's own source.
+
+    Attributes:
+        files: flat file name -> text.
+        main: the file to hand to the compiler.
+        statements: number of statements, by which the runtime chooses the optimisation level.
+        signatures: one a kernel.
+    """
+
+    files: Mapping[str, str]
+    main: str
+    statements: int
+    signatures: tuple[Signature, ...]
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The vectors of one kernel as C literals: [port][vector][entry]."""
+
+    count: int
+    inputs: tuple[tuple[tuple[str, ...], ...], ...]
+    outputs: tuple[tuple[tuple[str, ...], ...], ...]
+
+
+@dataclass(frozen=True)
+class _CsvRow:
+    symbol: str
+    number: int
+    direction: str
+    port: str
+    numbers: tuple[str, ...]
+
+
+def generate(
+    kernels: Sequence[Kernel],
+    folder: str | Path,
+    *,
+    namespace: str,
+    metadata: PackageMetadata | None = None,
+) -> tuple[Path, ...]:
+    """Write the C package of `kernels` as a folder; return the files written.
+
+    Raises:
+        CodegenError: a kernel cannot become C, or two symbols collide.
+        IdentifierError: the namespace is no C identifier.
+        OutputFolderError: the folder cannot be written, or holds files that are not ours.
+    """
+    return write_package(render_package(namespace, kernels, metadata), folder)
+
+
+def render_package(
+    namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata | None = None
+) -> dict[str, str]:
+    """The package as {path: text}; writes nothing.
+
+    Raises:
+        CodegenError, IdentifierError: as in `generate`.
+    """
+    tapes, view = _view(namespace, kernels, metadata or PackageMetadata())
+    vectors = [make_vectors(kernel) for kernel in kernels]
+    checks = [(shown, _rows(kernel, each)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)]
+    tree = {
+        f"include/{namespace}.h": render("header.h.jinja", package=view),
+        f"src/{namespace}.c": render("source.c.jinja", package=view),
+        "CMakeLists.txt": render("CMakeLists.txt.jinja", package=view),
+        f"{namespace}Config.cmake.in": render("Config.cmake.in.jinja", package=view),
+        "example.c": render("example.c.jinja", package=view, checks=checks, tolerance=repr(TOLERANCE)),
+        "test_vectors.csv": render("test_vectors.csv.jinja", rows=_csv_rows(kernels, vectors)),
+        "README.md": render("README.md.jinja", package=view),
+    }
+    return {**tree, "manifest.json": _manifest(view, kernels, tree)}
+
+
+def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
+    """The sources of the shared library that Python loads: the package's own, and the entry points.
+
+    Raises:
+        CodegenError, IdentifierError: as in `generate`.
+    """
+    tapes, view = _view(namespace, kernels, PackageMetadata())
+    files = {
+        f"{namespace}.h": render("header.h.jinja", package=view),
+        f"{namespace}.c": render("source.c.jinja", package=view),
+        f"{namespace}_binding.c": render("binding.c.jinja", package=view),
+    }
+    return LibrarySources(
+        files=files,
+        main=f"{namespace}_binding.c",
+        statements=sum(len(tape.statements) for tape in tapes),
+        signatures=tuple(Signature.of(kernel) for kernel in kernels),
+    )
+
+
+def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata) -> tuple[list[Tape], PackageView]:
+    check_identifier(namespace, "namespace")
+    _check_symbols(namespace, kernels)
+    tapes = [tape_of(kernel) for kernel in kernels]
+    return tapes, package_view(namespace, kernels, tapes, metadata)
+
+
+def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
+    """Every exported symbol bears the namespace, and no two are equal."""
+    if not kernels:
+        raise CodegenError(f"{namespace}: no kernel given")
+    owner: dict[str, str] = {}
+    for kernel in kernels:
+        if kernel.namespace != namespace:
+            raise CodegenError(f"kernel {kernel.symbol} is not of the namespace {namespace}: rename one of them")
+        suffixes = ("", "_call", "_batch") + (("_scan",) if is_step(kernel.inputs, kernel.outputs) else ())
+        for suffix in suffixes:
+            symbol = kernel.symbol + suffix
+            if symbol in owner:
+                raise CodegenError(f"kernels {owner[symbol]} and {kernel.symbol} both need the symbol {symbol}")
+            owner[symbol] = kernel.symbol
+
+
+def _rows(kernel: Kernel, vectors: Sequence[TestVector]) -> _Rows:
+    def literals(part: str, number: int) -> tuple[tuple[str, ...], ...]:
+        return tuple(tuple(c_literal(entry) for entry in getattr(vector, part)[number]) for vector in vectors)
+
+    return _Rows(
+        count=len(vectors),
+        inputs=tuple(literals("inputs", number) for number in range(len(kernel.inputs))),
+        outputs=tuple(literals("outputs", number) for number in range(len(kernel.outputs))),
+    )
+
+
+def _csv_rows(kernels: Sequence[Kernel], vectors: Sequence[Sequence[TestVector]]) -> list[_CsvRow]:
+    return [
+        _CsvRow(kernel.symbol, number, direction, port.name, tuple(repr(entry) for entry in values))
+        for kernel, each in zip(kernels, vectors, strict=True)
+        for number, vector in enumerate(each)
+        for direction, ports, parts in (("in", kernel.inputs, vector.inputs), ("out", kernel.outputs, vector.outputs))
+        for port, values in zip(ports, parts, strict=True)
+    ]
+
+
+def _manifest(view: PackageView, kernels: Sequence[Kernel], tree: Mapping[str, str]) -> str:
+    data: dict[str, Any] = {
+        "generator": GENERATOR,
+        "format": 1,
+        "namespace": view.namespace,
+        "version": view.version,
+        "functions": [Signature.of(kernel).to_json() for kernel in kernels],
+        "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
+    }
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,146 @@
+"""Kernel -> Tape: the straight-line, single-assignment program that templates print.
+
+CasADi keeps a scalar function as a list of instructions over a work vector that is overwritten; here
+every value has one name, so that the same program can be printed for scalars or for lanes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from lie_codegen.errors import CodegenError
+from lie_codegen.kernels.kernel import Kernel
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One value. `operands` are indices of earlier statements.
+
+    `op` is INPUT (entry `slot[1]` of port `slot[0]`), CONST (`value`), SELECT (operand 1 where operand
+    0 is not zero, else operand 2), or CasADi's name without its OP_.
+    """
+
+    op: str
+    operands: tuple[int, ...] = ()
+    slot: tuple[int, int] = (-1, -1)
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tape:
+    """A straight-line program.
+
+    Attributes:
+        statements: in order of evaluation: inputs first; sin and cos of one argument adjacent.
+        outputs: for each port, the statement of each of its entries, in C order.
+    """
+
+    statements: tuple[Statement, ...]
+    outputs: tuple[tuple[int, ...], ...]
+
+
+def tape_of(kernel: Kernel) -> Tape:
+    """The tape of a kernel.
+
+    Raises:
+        CodegenError: the kernel uses an operation that has no scalar meaning.
+    """
+    from lie_codegen.lowering.casadi_arithmetic import function_of
+
+    return tape_of_function(function_of(kernel))
+
+
+def tape_of_function(function: Any) -> Tape:
+    """The tape of a CasADi SX Function with dense columns, without dead code.
+
+    Raises:
+        CodegenError: it is not an SX function, or has a symbol that is no input.
+    """
+    if not function.is_a("SXFunction"):
+        raise CodegenError(f"{function.name()} is not a CasADi SX function: expand it first")
+    if function.has_free():
+        raise CodegenError(f"{function.name()} depends on symbols that are no inputs: {function.get_free()}")
+    statements, outputs = _single_assignment(function)
+    statements = _fuse_branches(statements)
+    return _schedule(statements, outputs)
+
+
+@cache
+def _operation_names() -> dict[int, str]:
+    import casadi as ca
+
+    return {getattr(ca, name): name.removeprefix("OP_") for name in dir(ca) if name.startswith("OP_")}
+
+
+def _single_assignment(function: Any) -> tuple[list[Statement], list[list[int]]]:
+    names = _operation_names()
+    statements: list[Statement] = []
+    known: dict[tuple[Statement, str], int] = {}
+
+    def add(statement: Statement) -> int:
+        # repr in the key of a constant, because 0.0 == -0.0 and NaN differs from itself
+        key = (statement, repr(statement.value))
+        if key not in known:
+            known[key] = len(statements)
+            statements.append(statement)
+        return known[key]
+
+    zero = Statement("CONST", value=0.0)
+    outputs = [[-1] * function.numel_out(i) for i in range(function.n_out())]
+    work: dict[int, int] = {}
+    for k in range(function.n_instructions()):
+        op = names[function.instruction_id(k)]
+        read, written = function.instruction_input(k), function.instruction_output(k)
+        if op == "OUTPUT":
+            outputs[written[0]][written[1]] = work[read[0]]
+        elif op == "INPUT":
+            work[written[0]] = add(Statement("INPUT", slot=(read[0], read[1])))
+        elif op == "CONST":
+            work[written[0]] = add(Statement("CONST", value=float(function.instruction_constant(k))))
+        else:
+            work[written[0]] = add(Statement(op, tuple(work[i] for i in read)))
+    return statements, [[add(zero) if index < 0 else index for index in port] for port in outputs]
+
+
+def _fuse_branches(statements: list[Statement]) -> list[Statement]:
+    """(c ? a : 0) + (!c ? b : 0) becomes c ? a : b; equal but for the sign of a zero."""
+    fused = list(statements)
+    for index, statement in enumerate(statements):
+        if statement.op != "ADD":
+            continue
+        first, second = (statements[i] for i in statement.operands)
+        if first.op != "IF_ELSE_ZERO" or second.op != "IF_ELSE_ZERO":
+            continue
+        (yes, a), (no, b) = first.operands, second.operands
+        if statements[no] == Statement("NOT", (yes,)):
+            fused[index] = Statement("SELECT", (yes, a, b))
+        elif statements[yes] == Statement("NOT", (no,)):
+            fused[index] = Statement("SELECT", (no, b, a))
+    return fused
+
+
+def _schedule(statements: list[Statement], outputs: Iterable[Iterable[int]]) -> Tape:
+    """Drop what no output needs, load the inputs first, bring sin x and cos x together."""
+    alive = {index for port in outputs for index in port}
+    for index in range(len(statements) - 1, -1, -1):
+        if index in alive:
+            alive.update(statements[index].operands)
+    live = [index for index in range(len(statements)) if index in alive]
+    partner = {}
+    for op, other in (("SIN", "COS"), ("COS", "SIN")):
+        by_argument = {statements[i].operands: i for i in live if statements[i].op == other}
+        partner.update({i: by_argument.get(statements[i].operands) for i in live if statements[i].op == op})
+    loads = sorted((i for i in live if statements[i].op == "INPUT"), key=lambda i: statements[i].slot)
+    place: dict[int, int] = {}
+    ordered: list[Statement] = []
+    for index in loads + live:
+        for each in (index, partner.get(index)):
+            if each is None or each in place:
+                continue
+            old = statements[each]
+            place[each] = len(ordered)
+            ordered.append(Statement(old.op, tuple(place[i] for i in old.operands), old.slot, old.value))
+    return Tape(tuple(ordered), tuple(tuple(place[i] for i in port) for port in outputs))

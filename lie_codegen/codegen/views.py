@@ -1,0 +1,233 @@
+"""What the templates see: small frozen records of text and numbers, never live objects."""
+
+from __future__ import annotations
+
+import keyword
+import re
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lie_codegen.codegen.opcodes import C99, MATH_NAMES, Target
+from lie_codegen.codegen.tape import Tape
+from lie_codegen.kernels.kernel import Kernel, Port
+
+_WIDTH = 108
+
+
+@dataclass(frozen=True)
+class PackageMetadata:
+    """What the generated folder says about the group.
+
+    Attributes:
+        title: one line; the namespace when empty.
+        description: a paragraph: matrices, brackets, what the coordinates mean.
+        labels: names of the basis, in the order of every vector.
+        units: one a label, or empty.
+        conventions: lines of the conventions section.
+        version: version of the CMake package.
+    """
+
+    title: str = ""
+    description: str = ""
+    labels: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    conventions: tuple[str, ...] = (
+        "Left-invariant: X' = X hat(u), u in the body frame.",
+        "Product of exponentials: X = exp(g1 A1) ... exp(gn An), in basis order.",
+        "SI units and radians.",
+    )
+    version: str = "0.1.0"
+
+
+@dataclass(frozen=True)
+class PortView:
+    """One argument of a C function."""
+
+    name: str
+    parameter: str
+    by_value: bool
+    is_complex: bool
+    size: int
+    shape: str
+    summary: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class StatementView:
+    """const <type> <name> = <expression>;"""
+
+    name: str
+    expression: str
+
+
+@dataclass(frozen=True)
+class StoreView:
+    """<parameter>[entry] = <value>;"""
+
+    parameter: str
+    entry: int
+    value: str
+
+
+@dataclass(frozen=True)
+class KernelView:
+    """One C function."""
+
+    name: str
+    symbol: str
+    formula: tuple[str, ...]
+    source: tuple[str, ...]
+    inputs: tuple[PortView, ...]
+    outputs: tuple[PortView, ...]
+    unused: tuple[str, ...]
+    statements: tuple[StatementView, ...]
+    stores: tuple[StoreView, ...]
+    is_step: bool
+
+
+@dataclass(frozen=True)
+class PackageView:
+    """The whole package."""
+
+    namespace: str
+    title: str
+    description: tuple[str, ...]
+    basis: tuple[str, ...]
+    conventions: tuple[str, ...]
+    version: str
+    type_name: str
+    kernels: tuple[KernelView, ...]
+
+
+def package_view(
+    namespace: str,
+    kernels: Sequence[Kernel],
+    tapes: Sequence[Tape],
+    metadata: PackageMetadata,
+    target: Target = C99,
+) -> PackageView:
+    """The view of a package: texts made safe for a C comment, statements printed for the target."""
+    units = metadata.units or ("",) * len(metadata.labels)
+    basis = tuple(
+        _safe(f"{index}: {label}" + (f" [{unit}]" if unit else ""))
+        for index, (label, unit) in enumerate(zip(metadata.labels, units, strict=True))
+    )
+    return PackageView(
+        namespace=namespace,
+        title=_safe(metadata.title or namespace),
+        description=comment_lines(metadata.description),
+        basis=basis,
+        conventions=tuple(line for text in metadata.conventions for line in comment_lines(text)),
+        version=metadata.version,
+        type_name=target.type_name,
+        kernels=tuple(kernel_view(kernel, tape, target) for kernel, tape in zip(kernels, tapes, strict=True)),
+    )
+
+
+def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99) -> KernelView:
+    """The view of one kernel."""
+    parameters = _parameter_names(kernel)
+    inputs = tuple(_port_view(port, parameters[port.name], is_input=True) for port in kernel.inputs)
+    outputs = tuple(_port_view(port, parameters[port.name], is_input=False) for port in kernel.outputs)
+    prefix = _temporary_prefix(parameters.values())
+    values: list[str] = []
+    statements: list[StatementView] = []
+    for index, statement in enumerate(tape.statements):
+        if statement.op == "CONST":
+            values.append(target.literal(statement.value))
+            continue
+        if statement.op == "INPUT":
+            port = inputs[statement.slot[0]]
+            text = port.parameter if port.by_value else target.load.format(port.parameter, statement.slot[1])
+        else:
+            text = target.expression(statement.op, tuple(values[i] for i in statement.operands))
+        values.append(f"{prefix}{index}")
+        statements.append(StatementView(values[-1], text))
+    read = {statement.slot[0] for statement in tape.statements if statement.op == "INPUT"}
+    stores = [
+        StoreView(port.parameter, entry, values[index])
+        for port, entries in zip(outputs, tape.outputs, strict=True)
+        for entry, index in enumerate(entries)
+    ]
+    return KernelView(
+        name=kernel.name,
+        symbol=kernel.symbol,
+        formula=comment_lines(kernel.formula),
+        source=comment_lines(f"Source: {kernel.source}" if kernel.source else ""),
+        inputs=inputs,
+        outputs=outputs,
+        unused=tuple(port.parameter for number, port in enumerate(inputs) if number not in read),
+        statements=tuple(statements),
+        stores=tuple(stores),
+        is_step=is_step(kernel.inputs, kernel.outputs),
+    )
+
+
+def is_step(inputs: Sequence[Port], outputs: Sequence[Port]) -> bool:
+    """Whether the first output has the type of the first input, so that the kernel can be iterated."""
+    if not inputs:
+        return False
+    state, after = inputs[0], outputs[0]
+    return (state.shape, state.is_complex) == (after.shape, after.is_complex)
+
+
+def comment_lines(text: str) -> tuple[str, ...]:
+    """Text wrapped and made safe inside a C comment, whoever wrote it."""
+    lines = [part for line in text.splitlines() for part in (textwrap.wrap(line, _WIDTH) or [""])]
+    return tuple(_safe(line) for line in lines)
+
+
+def python_field(name: str) -> str:
+    """The name of an output as an attribute of a Python result."""
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+def _safe(text: str) -> str:
+    """No end or start of a comment, no trigraph, no line splice, no control character."""
+    text = re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029\u202a-\u202e\u2066-\u2069]", " ", text)
+    text = re.sub(r"(?<=[*/?])(?=[*/?])", " ", text)
+    return text.replace("\\", "\\ ").rstrip()
+
+
+def _parameter_names(kernel: Kernel) -> dict[str, str]:
+    """Port name -> C parameter, renamed where it would hide a function the body may call."""
+    names = {port.name for port in kernel.inputs + kernel.outputs}
+    parameters = {}
+    for port in kernel.inputs + kernel.outputs:
+        parameter = port.name
+        while parameter in MATH_NAMES or parameter == kernel.symbol or (parameter != port.name and parameter in names):
+            parameter = f"{parameter}_"
+        parameters[port.name] = parameter
+    return parameters
+
+
+def _temporary_prefix(taken: object) -> str:
+    """The first of t, t_, t__ ... that no parameter could be mistaken for."""
+    names = list(taken)  # type: ignore[call-overload]
+    prefix = "t"
+    while any(re.fullmatch(re.escape(prefix) + r"[0-9]+", name) for name in names):
+        prefix += "_"
+    return prefix
+
+
+def _port_view(port: Port, parameter: str, *, is_input: bool) -> PortView:
+    layout = {0: "scalar", 1: "vector", 2: "matrix, row-major"}[len(port.shape)]
+    shape = "x".join(str(side) for side in port.shape) or "1"
+    parts = [f"({', '.join(map(str, port.shape))}) {layout}" if port.shape else layout]
+    if port.is_complex:
+        parts.append("complex, each entry as (re, im)")
+    if port.units:
+        parts.append(f"[{port.units}]")
+    text = f"{'in ' if is_input else 'out'} {parameter}: {', '.join(parts)}"
+    if port.description:
+        text += f"; {port.description}"
+    return PortView(
+        name=port.name,
+        parameter=parameter,
+        by_value=is_input and not port.shape and not port.is_complex,
+        is_complex=port.is_complex,
+        size=port.size,
+        shape=shape,
+        summary=comment_lines(text),
+    )

@@ -1,0 +1,163 @@
+"""Kernels -> Library: from the cache if an equal request was answered before, else generated and compiled.
+
+definition -> request digest -> entry              (warm: neither sympy nor casadi is imported)
+kernels -> C text -> entry digest -> entry         (known C text: nothing is compiled)
+C text -> compiler -> shared library -> entry      (cold)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.errors import CompileError
+from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernels.kernel import Kernel
+from lie_codegen.runtime import cache
+from lie_codegen.runtime.backend import CtypesBackend, InterpretedBackend, load_library
+from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
+from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.compiler import (
+    Compiler,
+    compile_library,
+    find_compilers,
+    flags_for,
+    is_working,
+    warn_no_compiler,
+)
+from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
+from lie_codegen.runtime.library import Library, check_names
+
+_SUFFIX = ".so"
+
+
+def build_kernels(
+    make_kernels: Callable[[], Sequence[Kernel]],
+    *,
+    namespace: str,
+    definition: str | None = None,
+    options: Mapping[str, Any] | None = None,
+) -> Library:
+    """The kernels as a library of callables.
+
+    Args:
+        make_kernels: makes the kernels; not called when the answer to `definition` is in the cache.
+        namespace: prefix of the C symbols.
+        definition: text that, with the source of this package, determines the kernels; None if they
+            come from elsewhere.
+        options: plain data that `make_kernels` depends on beside the definition.
+
+    Raises:
+        CodegenError: a kernel cannot become C.
+        CompileError: a compiler that works refuses the C text.
+        CacheError: there is no folder to build in.
+    """
+    check_identifier(namespace, "namespace")
+    compilers = find_compilers()
+    if not compilers:
+        warn_no_compiler()
+        return interpreted(make_kernels(), namespace=namespace)
+    folder = usable_folder()
+    requests = []
+    if definition is not None:
+        requests = [_request(namespace, definition, options or {}, compiler) for compiler in compilers]
+        for request in requests:
+            entry = cache.find_request(folder, request)
+            if entry is not None:
+                return _open(namespace, entry)
+    kernels = tuple(make_kernels())
+    try:
+        return _compile(folder, namespace, kernels, compilers, requests)
+    except OSError as error:
+        reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
+        return _compile(temporary_folder(reason), namespace, kernels, compilers, requests)
+
+
+def interpreted(kernels: Sequence[Kernel], *, namespace: str) -> Library:
+    """The kernels run by CasADi's interpreter: no compiler, the same results."""
+    from lie_codegen.codegen.package import render_library
+    from lie_codegen.lowering.casadi_arithmetic import function_of
+
+    signatures = render_library(namespace, kernels).signatures  # refuses what C would refuse
+    check_names(signatures)
+    functions = [
+        Compiled(signature, InterpretedBackend(function_of(kernel)), compiled=False)
+        for signature, kernel in zip(signatures, kernels, strict=True)
+    ]
+    return Library(namespace, functions, None)
+
+
+def _request(namespace: str, definition: str, options: Mapping[str, Any], compiler: Compiler) -> str:
+    return digest(
+        {
+            "namespace": namespace,
+            "definition": definition,
+            "options": dict(options),
+            "package": package_digest(),
+            "templates": templates_digest(),
+            "versions": versions(),
+            "flags": flags_for(0),
+            "compiler": compiler.identity,
+            "cpu": cpu_identity(),
+        }
+    )
+
+
+def _compile(
+    folder: Path,
+    namespace: str,
+    kernels: Sequence[Kernel],
+    compilers: Sequence[Compiler],
+    requests: Sequence[str],
+) -> Library:
+    from lie_codegen.codegen.package import render_library
+
+    sources = render_library(namespace, kernels)
+    check_names(sources.signatures)
+    flags = flags_for(sources.statements)
+    failure: CompileError | None = None
+    for number, compiler in enumerate(compilers):
+        key = digest(
+            {
+                "files": dict(sources.files),
+                "signatures": [signature.to_json() for signature in sources.signatures],
+                "flags": flags,
+                "compiler": compiler.identity,
+                "versions": versions(),
+                "templates": templates_digest(),
+                "cpu": cpu_identity(),
+            }
+        )
+        try:
+            with cache.lock(folder, key):
+                entry = cache.find_entry(folder, key) or _fill(folder, key, namespace, sources, compiler, flags)
+                if requests:
+                    cache.store_request(folder, requests[number], key)
+        except CompileError as error:
+            with cache.scratch(folder) as probe:
+                if is_working(compiler, probe):
+                    raise
+            failure = failure or error
+            continue
+        library = _open(namespace, entry)
+        cache.evict(folder, keep=key)
+        return library
+    raise failure or CompileError("no compiler to try")
+
+
+def _fill(
+    folder: Path, key: str, namespace: str, sources: Any, compiler: Compiler, flags: tuple[str, ...]
+) -> cache.Entry:
+    with cache.scratch(folder) as home:
+        for name, text in sources.files.items():
+            (home / name).write_bytes(text.encode())
+        output = f"{namespace}{_SUFFIX}"
+        compile_library(compiler, home, sources.main, output, flags)
+        return cache.store_entry(folder, key, home / output, namespace, sources.signatures)
+
+
+def _open(namespace: str, entry: cache.Entry) -> Library:
+    shared = load_library(entry.library)
+    functions = [Compiled(signature, CtypesBackend(shared, signature), compiled=True) for signature in entry.signatures]
+    return Library(namespace, functions, entry.library)

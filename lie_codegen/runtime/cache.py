@@ -1,0 +1,250 @@
+"""The cache of compiled libraries: written atomically, locked across processes, verified before every load.
+
+    <cache>/entries/<digest>/entry.json      signatures, file name and SHA-256 of the library
+    <cache>/entries/<digest>/<name>-<its own SHA-256>.so
+    <cache>/requests/<digest>.json           a request (definition, options, versions) -> an entry
+    <cache>/locks/<digest>.lock
+
+The name of a library holds the digest of its content: a path that was loaded is never another library later.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.codegen.signature import Signature
+from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
+
+_DEFAULT_LIMIT = 1 << 30
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+_STALE_SECONDS = 86_400.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A verified library on disk."""
+
+    library: Path
+    signatures: tuple[Signature, ...]
+
+
+@dataclass(frozen=True)
+class CacheInfo:
+    """What `lie-codegen cache` shows.
+
+    Attributes:
+        folder: where the cache is.
+        problem: why it cannot be used, or None.
+        entries, bytes: number of libraries, and their size.
+        limit: bytes above which the least recently used go; LIE_CODEGEN_CACHE_LIMIT overrides.
+    """
+
+    folder: Path
+    problem: str | None
+    entries: int
+    bytes: int
+    limit: int
+
+
+def cache_info() -> CacheInfo:
+    """The state of the cache."""
+    folder = cache_folder()
+    problem = why_unusable(folder) if folder.exists() else None
+    entries = _entries(folder)
+    return CacheInfo(folder, problem, len(entries), sum(_size(entry) for entry in entries), limit())
+
+
+def clear_cache() -> int:
+    """Remove every library and request, and nothing else; return the number of libraries removed."""
+    folder = cache_folder()
+    entries = _entries(folder)
+    for entry in entries:
+        _remove_entry(entry)
+    for pattern in ("requests/*.json", "locks/*.lock"):
+        for file in folder.glob(pattern):
+            if _DIGEST.fullmatch(file.stem):
+                _unlink(file)
+    for scratch in folder.glob("scratch/build-*"):
+        _remove_scratch(scratch)
+    for name in ("entries", "requests", "locks", "scratch"):
+        with contextlib.suppress(OSError):
+            (folder / name).rmdir()
+    return len(entries)
+
+
+def limit() -> int:
+    """Size of the cache in bytes: LIE_CODEGEN_CACHE_LIMIT, else 1 GiB."""
+    try:
+        return max(0, int(os.environ.get("LIE_CODEGEN_CACHE_LIMIT", "")))
+    except ValueError:
+        return _DEFAULT_LIMIT
+
+
+def find_request(folder: Path, request: str) -> Entry | None:
+    """The library that answered an equal request before, verified; None if there is none."""
+    data = _read_json(folder / "requests" / f"{request}.json")
+    key = data.get("entry") if isinstance(data, dict) else None
+    return find_entry(folder, key) if isinstance(key, str) and _DIGEST.fullmatch(key) else None
+
+
+def find_entry(folder: Path, key: str) -> Entry | None:
+    """The library of that digest, verified byte for byte; None if it is missing or damaged."""
+    home = folder / "entries" / key
+    data = _read_json(home / "entry.json")
+    try:
+        name, expected = str(data["file"]), str(data["sha256"])
+        signatures = tuple(Signature.from_json(each) for each in data["signatures"])
+        if "/" in name or "\\" in name or _file_digest(home / name) != expected:
+            return None
+    except (OSError, ValueError, TypeError, LookupError):
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(home / "entry.json")  # the time of last use, for eviction
+    return Entry(home / name, signatures)
+
+
+def store_entry(folder: Path, key: str, built: Path, stem: str, signatures: Sequence[Signature]) -> Entry:
+    """Move a library just built (on the same disk) into the cache.
+
+    Raises:
+        OSError: the disk is full or the folder cannot be written; no half entry is left.
+    """
+    content = _file_digest(built)
+    home = folder / "entries" / key
+    home.mkdir(mode=0o700, parents=True, exist_ok=True)
+    library = home / f"{stem}-{content[:32]}{built.suffix}"
+    os.replace(built, library)
+    data = {"file": library.name, "sha256": content, "signatures": [each.to_json() for each in signatures]}
+    write_json(home / "entry.json", data)
+    return Entry(library, tuple(signatures))
+
+
+def store_request(folder: Path, request: str, key: str) -> None:
+    """Remember which library answers a request.
+
+    Raises:
+        OSError: as `store_entry`.
+    """
+    write_json(folder / "requests" / f"{request}.json", {"entry": key})
+
+
+@contextlib.contextmanager
+def lock(folder: Path, key: str) -> Iterator[None]:
+    """Hold the entry against other processes; a process that dies lets go of it.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    from filelock import FileLock
+
+    locks = folder / "locks"
+    locks.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with FileLock(locks / f"{key}.lock"):
+        yield
+
+
+@contextlib.contextmanager
+def scratch(folder: Path) -> Iterator[Path]:
+    """A private folder to build in, on the disk of the cache; gone afterwards.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    parent = folder / "scratch"
+    parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    home = Path(tempfile.mkdtemp(prefix="build-", dir=parent))
+    try:
+        yield home
+    finally:
+        _remove_scratch(home)
+
+
+def evict(folder: Path, keep: str) -> None:
+    """Remove what a killed build left, and the least recently used libraries above the limit."""
+    for left in folder.glob("scratch/build-*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > _STALE_SECONDS:
+                _remove_scratch(left)
+    entries = sorted(_entries(folder), key=_last_use)
+    total = sum(_size(entry) for entry in entries)
+    for entry in entries:
+        if total <= limit():
+            break
+        if entry.name != keep:
+            total -= _size(entry)
+            _remove_entry(entry)
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write atomically: a reader sees the old file or the new one.
+
+    Raises:
+        OSError: it cannot be written; the old file is untouched.
+    """
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(prefix=".new-", dir=path.parent)
+    try:
+        with open(descriptor, "w", encoding="utf-8") as file:
+            json.dump(data, file)
+        os.replace(name, path)
+    except OSError:
+        _unlink(Path(name))
+        raise
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _file_digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _entries(folder: Path) -> list[Path]:
+    return [path for path in folder.glob("entries/*") if _DIGEST.fullmatch(path.name) and path.is_dir()]
+
+
+def _last_use(entry: Path) -> float:
+    try:
+        return (entry / "entry.json").stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _size(entry: Path) -> int:
+    total = 0
+    for file in entry.glob("*"):
+        with contextlib.suppress(OSError):
+            total += file.stat().st_size
+    return total
+
+
+def _remove_entry(entry: Path) -> None:
+    _unlink(entry / "entry.json")  # first: without it the rest is never loaded
+    for file in (*entry.glob("*-????????????????????????????????.*"), *entry.glob(".new-*")):
+        _unlink(file)
+    with contextlib.suppress(OSError):
+        entry.rmdir()
+
+
+def _remove_scratch(home: Path) -> None:
+    shutil.rmtree(home, ignore_errors=True)  # made by mkdtemp in our own folder; compilers may leave folders in it
+
+
+def _unlink(file: Path) -> None:
+    with contextlib.suppress(OSError):
+        file.unlink()

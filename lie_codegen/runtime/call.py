@@ -1,0 +1,142 @@
+"""Compiled: a kernel that can be called with numbers, on one point, on a batch, or as a loop."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.codegen.signature import Signature
+from lie_codegen.codegen.views import is_step, python_field
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.runtime.arguments import Array, bind, checked, describe, dtype_of, outputs_for, sequences, unshared
+from lie_codegen.runtime.backend import Backend
+
+
+class Compiled:
+    """A callable kernel.
+
+    Attributes:
+        name: attribute of the library.
+        inputs, outputs: the ports.
+        compiled: False where CasADi's interpreter stands in for C.
+    """
+
+    def __init__(self, signature: Signature, backend: Backend, *, compiled: bool) -> None:
+        self.name = signature.name
+        self.inputs = signature.inputs
+        self.outputs = signature.outputs
+        self.compiled = compiled
+        self.__doc__ = documentation(signature)
+        self._signature = signature
+        self._backend = backend
+        fields = [python_field(port.name) for port in signature.outputs]
+        self._result: Any = namedtuple(f"{signature.name}_result", fields) if len(fields) > 1 else None
+        self._scalar = not signature.outputs[0].shape
+
+    def __call__(self, *args: Any, out: Any = None, **named: Any) -> Any:
+        """Evaluate once.
+
+        Args:
+            *args: the inputs in order: arrays, lists or numbers of exactly the ports' shapes.
+            out: an array (a tuple of arrays for several outputs) to write to: exact shape, float64 or
+                complex128, C-contiguous, writable. It may be an input.
+            **named: inputs by name.
+
+        Returns:
+            The output; a Python number if it is a scalar; a named tuple if there are several.
+
+        Raises:
+            ShapeError: naming the argument, what was expected and what was given.
+        """
+        values = bind(self._signature, args, named) if named or len(args) != len(self.inputs) else args
+        arrays = [checked(self.name, port, value) for port, value in zip(self.inputs, values, strict=True)]
+        outputs = outputs_for(self._signature, out, ())
+        self._backend.call(arrays, outputs)
+        return self._wrap(outputs, out, scalars=True)
+
+    def batch(self, *args: Any, out: Any = None, **named: Any) -> Any:
+        """Evaluate N times: an input has a leading axis of length N, or is the same for all.
+
+        Returns:
+            (N, *shape), or a named tuple of such arrays.
+
+        Raises:
+            ShapeError: as for a call; or no input has the leading axis, or two lengths differ.
+        """
+        values = bind(self._signature, args, named)
+        arrays, strides, count = sequences(self._signature, values, "samples", self.inputs)
+        if count is None:
+            raise ShapeError(f"{self.name}.batch: no input has a leading axis of samples; call {self.name} itself")
+        outputs = outputs_for(self._signature, out, (count,))
+        if out is not None:
+            arrays = unshared(arrays, outputs)
+        self._backend.batch(count, arrays, strides, outputs)
+        return self._wrap(outputs, out, scalars=False)
+
+    def scan(self, *args: Any, n: int, every: int = 1, out: Any = None, **named: Any) -> Array:
+        """The loop state <- f(state, ...), n times, in C; the state is the first input and the first output.
+
+        Args:
+            *args, **named: the start, then the other inputs: with a leading axis of length n, one a step,
+                or the same for all steps.
+            n: number of steps, a multiple of `every`.
+            every: steps from one stored state to the next.
+            out: as for a call, of the shape returned.
+
+        Returns:
+            (n // every + 1, *shape): the start, then every `every`-th state.
+
+        Raises:
+            InputError: the kernel is no step, or n is no multiple of `every`.
+            ShapeError: as for a batch.
+        """
+        if not is_step(self.inputs, self.outputs):
+            raise InputError(f"{self.name}.scan: the first output is not of the shape of the first input")
+        for name, value, least in (("n", n, 0), ("every", every, 1)):
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+                raise InputError(f"{self.name}.scan: {name} is an integer of at least {least}, given {value!r}")
+        if n % every:
+            raise InputError(f"{self.name}.scan: n = {n} is no multiple of every = {every}")
+        start, *rest = bind(self._signature, args, named)
+        state = checked(self.name, self.inputs[0], start)
+        arrays, strides, count = sequences(self._signature, rest, "steps", self.inputs[1:])
+        if count is not None and count != n:
+            raise ShapeError(f"{self.name}.scan: inputs have {count} steps, n = {n}")
+        port = self.outputs[0]
+        only = Signature(self.name, self._signature.symbol, self.inputs, (port,))
+        (trajectory,) = outputs_for(only, out, (int(n) // int(every) + 1,))
+        arrays = [state, *arrays]
+        if out is not None:
+            arrays = unshared(arrays, [trajectory])
+        self._backend.scan(int(n), int(every), arrays, [0, *strides], trajectory)
+        return trajectory
+
+    def _wrap(self, outputs: list[Array], out: Any, *, scalars: bool) -> Any:
+        if out is not None:
+            return out if self._result is None else self._result(*outputs)
+        values = [array.item() if scalars and array.ndim == 0 else array for array in outputs]
+        return values[0] if self._result is None else self._result(*values)
+
+    def __repr__(self) -> str:
+        how = "compiled" if self.compiled else "interpreted"
+        return f"<{how} kernel {_prototype(self._signature)}>"
+
+
+def documentation(signature: Signature) -> str:
+    """The docstring of a compiled kernel."""
+    lines = [_prototype(signature), "", signature.formula, ""]
+    for port in signature.inputs + signature.outputs:
+        units = f" [{port.units}]" if port.units else ""
+        about = f": {port.description}" if port.description else ""
+        lines.append(f"{port.name}: {describe(port)}, {dtype_of(port)}{units}{about}")
+    if signature.source:
+        lines += ["", f"Source: {signature.source}"]
+    return "\n".join(lines)
+
+
+def _prototype(signature: Signature) -> str:
+    inputs = ", ".join(f"{port.name} {port.shape}" for port in signature.inputs)
+    outputs = ", ".join(f"{port.name} {port.shape}" for port in signature.outputs)
+    return f"{signature.name}({inputs}) -> {outputs}"

@@ -1,0 +1,146 @@
+"""Finding a C compiler and turning C text into a shared library.
+
+The ladder: $LIE_CODEGEN_CC, $CC, cc, gcc, clang, then `python -m ziglang cc` if that wheel is installed.
+LIE_CODEGEN_CC=none stops the search. Microsoft's compiler is out of scope: its command line is
+another; on Windows install the zig extra.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from lie_codegen.errors import CompileError, NoCompilerWarning
+
+#: -ffp-contract=off: the same numbers as the interpreter; never -ffast-math, which changes the whole process.
+FLAGS = ("-std=c99", "-fno-math-errno", "-ffp-contract=off", "-fPIC", "-shared")
+NATIVE = "-march=native"
+#: Above this many statements -O2 costs minutes and gains little.
+LARGE = 20_000
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A compiler that was found.
+
+    Attributes:
+        command: program and leading arguments.
+        identity: the command, the program's real path, its size and time of change; changes when the
+            compiler is upgraded, and costs no process to find out.
+    """
+
+    command: tuple[str, ...]
+    identity: str
+
+
+def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compiler, ...]:
+    """The compilers of the ladder that exist, best first; empty when there is none."""
+    variables = os.environ if environment is None else environment
+    if variables.get("LIE_CODEGEN_CC", "").strip().lower() == "none":
+        return ()
+    found: dict[str, Compiler] = {}
+    for command in _ladder(variables):
+        program = shutil.which(command[0], path=variables.get("PATH", ""))
+        if program is None:
+            continue
+        extra = command[1:] if command[1:2] != ("-m",) else ()
+        real = _zig_program() if command[1:2] == ("-m",) else os.path.realpath(program)
+        found.setdefault(" ".join((real, *extra)), Compiler((program, *command[1:]), _identity(command, real)))
+    return tuple(found.values())
+
+
+@cache
+def warn_no_compiler() -> None:
+    """Say once a process that kernels will be interpreted."""
+    warnings.warn(
+        "no C compiler found ($CC, cc, gcc, clang, the ziglang package): kernels are interpreted, with the same "
+        "results, more slowly. Install a compiler, or: pip install 'lie_codegen[zig]'",
+        NoCompilerWarning,
+        stacklevel=3,
+    )
+
+
+def flags_for(statements: int) -> tuple[str, ...]:
+    """The flags for a unit of that many statements."""
+    return ("-O1" if statements > LARGE else "-O2", NATIVE, *FLAGS)
+
+
+def compile_library(compiler: Compiler, folder: Path, main: str, output: str, flags: tuple[str, ...]) -> None:
+    """Compile `folder/main` to the shared library `folder/output`.
+
+    A compiler that does not know -march=native is asked again without it.
+
+    Raises:
+        CompileError: with the command and what the compiler printed.
+    """
+    attempts = [flags]
+    if NATIVE in flags:
+        attempts.append(tuple(flag for flag in flags if flag != NATIVE))
+    failures = []
+    for attempt in attempts:
+        command = (*compiler.command, *attempt, "-o", output, main, "-lm")
+        try:
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                env=_quiet_environment(),
+                check=False,
+            )
+        except OSError as error:
+            raise CompileError(f"cannot run {shlex.join(command)}: {error}") from error
+        if done.returncode == 0 and (folder / output).is_file():
+            return
+        failures.append(f"{shlex.join(command)}\nexit status {done.returncode}\n{done.stderr[-4000:].strip()}")
+    raise CompileError("the C compiler failed:\n" + failures[0])
+
+
+def is_working(compiler: Compiler, folder: Path) -> bool:
+    """Whether it compiles the smallest program; asked only after a failure, to tell whose fault it was."""
+    (folder / "probe.c").write_text("int lie_codegen_probe(void);\nint lie_codegen_probe(void) { return 0; }\n")
+    try:
+        compile_library(compiler, folder, "probe.c", "probe.so", flags_for(0))
+    except CompileError:
+        return False
+    return True
+
+
+def _ladder(variables: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
+    for name in ("LIE_CODEGEN_CC", "CC"):
+        try:
+            words = tuple(shlex.split(variables.get(name, "")))
+        except ValueError:
+            words = ()
+        if words:
+            yield words
+    yield from (("cc",), ("gcc",), ("clang",))
+    if sys.executable and importlib.util.find_spec("ziglang") is not None:
+        yield (sys.executable, "-m", "ziglang", "cc")
+
+
+def _zig_program() -> str:
+    spec = importlib.util.find_spec("ziglang")
+    return os.path.realpath(spec.origin) if spec is not None and spec.origin else "ziglang"
+
+
+def _identity(command: tuple[str, ...], real: str) -> str:
+    try:
+        status = os.stat(real)
+    except OSError:
+        return " ".join((*command, real))
+    return " ".join((*command, real, str(status.st_size), str(status.st_mtime_ns)))
+
+
+def _quiet_environment() -> dict[str, str]:
+    return {**os.environ, "LC_ALL": "C"}

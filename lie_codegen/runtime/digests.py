@@ -1,0 +1,73 @@
+"""What a compiled library depends on, as digests."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+#: Distributions whose version may change the C text.
+_DISTRIBUTIONS = ("casadi", "sympy", "jinja2")
+
+
+def digest(data: Any) -> str:
+    """SHA-256 of plain data, by its canonical JSON."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Version of each distribution, read without importing it."""
+    found = {}
+    for name in _DISTRIBUTIONS:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+@cache
+def package_digest() -> str:
+    """Digest of this package's own source and templates: a changed formula is a changed library."""
+    return _tree_digest(Path(__file__).resolve().parent.parent, ".py")
+
+
+@cache
+def templates_digest() -> str:
+    """Digest of the templates."""
+    from lie_codegen.codegen.templates import template_folder
+
+    return _tree_digest(template_folder(), ".jinja")
+
+
+@cache
+def cpu_identity() -> str:
+    """Model and features of the processor, for which -march=native compiles."""
+    wanted = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa", "cpu")
+    lines = []
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+            for line in file:
+                key = line.split(":")[0].strip()
+                if not key and lines:
+                    break
+                if key in wanted:
+                    lines.append(line.strip())
+    except OSError:
+        lines = []
+    return "\n".join([platform.system(), platform.machine(), *lines])
+
+
+def _tree_digest(folder: Path, suffix: str) -> str:
+    files = sorted(path for path in folder.rglob(f"*{suffix}") if path.is_file())
+    summary = hashlib.sha256()
+    for path in files:
+        content = path.read_bytes()
+        summary.update(f"{path.relative_to(folder).as_posix()}\0{len(content)}\0".encode())
+        summary.update(content)
+    return summary.hexdigest()

@@ -1,0 +1,76 @@
+"""Library: the kernels of one namespace, ready to be called."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.codegen.signature import Signature
+from lie_codegen.errors import CodegenError
+from lie_codegen.runtime.call import Compiled
+
+
+class Library:
+    """Compiled kernels, each an attribute and an item.
+
+    Attributes:
+        namespace: prefix of the C symbols.
+        kernels: names, in order.
+        compiled: False where CasADi's interpreter stands in for C.
+        path: the shared library, or None.
+    """
+
+    namespace: str
+    kernels: tuple[str, ...]
+    compiled: bool
+    path: Path | None
+
+    def __init__(self, namespace: str, functions: Sequence[Compiled], path: Path | None) -> None:
+        self.namespace = namespace
+        self.kernels = tuple(function.name for function in functions)
+        self.compiled = path is not None
+        self.path = path
+        self._functions = {function.name: function for function in functions}
+
+    def __getattr__(self, name: str) -> Compiled:
+        functions = self.__dict__.get("_functions", {})
+        if name in functions:
+            found: Compiled = functions[name]
+            return found
+        close = difflib.get_close_matches(name, functions, n=3) if not name.startswith("_") else []
+        hint = f"; near: {', '.join(close)}" if close else f"; it has {', '.join(functions)}"
+        raise AttributeError(f"the library {self.__dict__.get('namespace')} has no kernel {name!r}{hint}")
+
+    def __getitem__(self, name: str) -> Compiled:
+        return self._functions[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.kernels)
+
+    def __len__(self) -> int:
+        return len(self.kernels)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.kernels})
+
+    def __repr__(self) -> str:
+        how = "compiled" if self.compiled else "interpreted"
+        return f"<{how} library {self.namespace}: {', '.join(self.kernels)}>"
+
+
+def check_names(signatures: Sequence[Signature]) -> None:
+    """No kernel hides an attribute of the library.
+
+    Raises:
+        CodegenError: naming it.
+    """
+    for signature in signatures:
+        if signature.name in Library.__annotations__ or hasattr(Library, signature.name):
+            raise CodegenError(f"a kernel cannot be called {signature.name}: libraries have that attribute")
+
+
+def attribute_of(library: Library, name: str) -> Any:
+    """A kernel by name, for callers with a string."""
+    return library[name]
