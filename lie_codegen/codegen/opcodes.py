@@ -6,6 +6,7 @@ An operation missing here is refused by name: nothing is ever printed as somethi
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -66,12 +67,11 @@ C99_FORMS: Mapping[str, str] = {
     "SELECT": "{0} != 0.0 ? {1} : {2}",
 }
 
-#: Names of <math.h> that the forms above and the literals use: no C parameter may hide them.
-MATH_NAMES = frozenset(
-    """pow sqrt exp expm1 log log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh erf hypot fabs
-    floor ceil fmod remainder copysign fmin fmax HUGE_VAL NAN INFINITY NULL I errno isnan isinf isfinite signbit
-    fpclassify isnormal math_errhandling memcpy assert complex imaginary bool unix linux""".split()
-)
+#: Macros a C parameter would be replaced by, in C or in the GNU dialects.
+_MACROS = ("HUGE_VAL", "NAN", "INFINITY", "NULL", "I", "errno", "assert", "complex", "imaginary", "unix", "linux")
+
+#: Names that no C parameter may have: the functions that the forms call, and macros.
+RESERVED = frozenset(re.findall(r"[a-z]\w*(?=\()", " ".join(C99_FORMS.values()))) | frozenset(_MACROS)
 
 
 def c_literal(value: float) -> str:

@@ -6,16 +6,15 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.opcodes import c_literal
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.codegen.tape import Tape, tape_of
+from lie_codegen.codegen.tape import tape_of
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.vectors import TestVector, make_vectors
 from lie_codegen.codegen.views import PackageMetadata, PackageView, is_step, package_view
-from lie_codegen.codegen.write import GENERATOR, write_package
+from lie_codegen.codegen.write import GENERATOR
 from lie_codegen.errors import CodegenError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernels.kernel import Kernel
@@ -59,32 +58,15 @@ class _CsvRow:
     numbers: tuple[str, ...]
 
 
-def generate(
-    kernels: Sequence[Kernel],
-    folder: str | Path,
-    *,
-    namespace: str,
-    metadata: PackageMetadata | None = None,
-) -> tuple[Path, ...]:
-    """Write the C package of `kernels` as a folder; return the files written.
-
-    Raises:
-        CodegenError: a kernel cannot become C, or two symbols collide.
-        IdentifierError: the namespace is no C identifier.
-        OutputFolderError: the folder cannot be written, or holds files that are not ours.
-    """
-    return write_package(render_package(namespace, kernels, metadata), folder)
-
-
 def render_package(
     namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata | None = None
 ) -> dict[str, str]:
     """The package as {path: text}; writes nothing.
 
     Raises:
-        CodegenError, IdentifierError: as in `generate`.
+        CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
     """
-    tapes, view = _view(namespace, kernels, metadata or PackageMetadata())
+    view = _view(namespace, kernels, metadata or PackageMetadata())
     vectors = [make_vectors(kernel) for kernel in kernels]
     checks = [(shown, _rows(kernel, each)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)]
     tree = {
@@ -103,9 +85,9 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     """The sources of the shared library that Python loads: the package's own, and the entry points.
 
     Raises:
-        CodegenError, IdentifierError: as in `generate`.
+        CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
     """
-    tapes, view = _view(namespace, kernels, PackageMetadata())
+    view = _view(namespace, kernels, PackageMetadata())
     files = {
         f"{namespace}.h": render("header.h.jinja", package=view),
         f"{namespace}.c": render("source.c.jinja", package=view),
@@ -114,16 +96,16 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     return LibrarySources(
         files=files,
         main=f"{namespace}_binding.c",
-        statements=sum(len(tape.statements) for tape in tapes),
+        statements=sum(len(kernel.statements) for kernel in view.kernels),
         signatures=tuple(Signature.of(kernel) for kernel in kernels),
     )
 
 
-def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata) -> tuple[list[Tape], PackageView]:
+def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata) -> PackageView:
     check_identifier(namespace, "namespace")
     _check_symbols(namespace, kernels)
     tapes = [tape_of(kernel) for kernel in kernels]
-    return tapes, package_view(namespace, kernels, tapes, metadata)
+    return package_view(namespace, kernels, tapes, metadata)
 
 
 def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:

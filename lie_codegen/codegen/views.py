@@ -5,10 +5,10 @@ from __future__ import annotations
 import keyword
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from lie_codegen.codegen.opcodes import C99, MATH_NAMES, Target
+from lie_codegen.codegen.opcodes import C99, RESERVED, Target
 from lie_codegen.codegen.tape import Tape
 from lie_codegen.kernels.kernel import Kernel, Port
 
@@ -196,15 +196,15 @@ def _parameter_names(kernel: Kernel) -> dict[str, str]:
     parameters = {}
     for port in kernel.inputs + kernel.outputs:
         parameter = port.name
-        while parameter in MATH_NAMES or parameter == kernel.symbol or (parameter != port.name and parameter in names):
+        while parameter in RESERVED or parameter == kernel.symbol or (parameter != port.name and parameter in names):
             parameter = f"{parameter}_"
         parameters[port.name] = parameter
     return parameters
 
 
-def _temporary_prefix(taken: object) -> str:
+def _temporary_prefix(names: Iterable[str]) -> str:
     """The first of t, t_, t__ ... that no parameter could be mistaken for."""
-    names = list(taken)  # type: ignore[call-overload]
+    names = tuple(names)
     prefix = "t"
     while any(re.fullmatch(re.escape(prefix) + r"[0-9]+", name) for name in names):
         prefix += "_"

@@ -17,8 +17,8 @@ GENERATOR = "lie_codegen"
 _MANIFEST = "manifest.json"
 
 
-def write_package(tree: Mapping[str, str], folder: str | Path) -> tuple[Path, ...]:
-    """Write {path: text} as `folder`, replacing an earlier generated package there; return the files.
+def write_package(tree: Mapping[str, str], folder: str | Path) -> Path:
+    """Write {path: text} as `folder`, replacing an earlier generated package there; return its path.
 
     The tree is written to a temporary folder beside it, then renamed.
 
@@ -40,7 +40,7 @@ def write_package(tree: Mapping[str, str], folder: str | Path) -> tuple[Path, ..
     except OSError as error:
         _remove(fresh, tree)
         raise OutputFolderError(f"cannot write {folder}: {error.strerror or error}; choose another folder") from error
-    return tuple(target / path for path in tree)
+    return target
 
 
 def _owned_files(target: Path) -> tuple[str, ...]:

@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import CompileError
-from lie_codegen.identifiers import check_identifier
+from lie_codegen.errors import CodegenError, CompileError
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.backend import CtypesBackend, InterpretedBackend, load_library
@@ -35,7 +34,7 @@ _SUFFIX = ".so"
 def build_kernels(
     make_kernels: Callable[[], Sequence[Kernel]],
     *,
-    namespace: str,
+    namespace: str | None = None,
     definition: str | None = None,
     options: Mapping[str, Any] | None = None,
 ) -> Library:
@@ -43,7 +42,7 @@ def build_kernels(
 
     Args:
         make_kernels: makes the kernels; not called when the answer to `definition` is in the cache.
-        namespace: prefix of the C symbols.
+        namespace: prefix of the C symbols; that of the kernels when None.
         definition: text that, with the source of this package, determines the kernels; None if they
             come from elsewhere.
         options: plain data that `make_kernels` depends on beside the definition.
@@ -53,7 +52,6 @@ def build_kernels(
         CompileError: a compiler that works refuses the C text.
         CacheError: there is no folder to build in.
     """
-    check_identifier(namespace, "namespace")
     compilers = find_compilers()
     if not compilers:
         warn_no_compiler()
@@ -65,7 +63,7 @@ def build_kernels(
         for request in requests:
             entry = cache.find_request(folder, request)
             if entry is not None:
-                return _open(namespace, entry)
+                return _open(entry)
     kernels = tuple(make_kernels())
     try:
         return _compile(folder, namespace, kernels, compilers, requests)
@@ -74,11 +72,12 @@ def build_kernels(
         return _compile(temporary_folder(reason), namespace, kernels, compilers, requests)
 
 
-def interpreted(kernels: Sequence[Kernel], *, namespace: str) -> Library:
+def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:
     """The kernels run by CasADi's interpreter: no compiler, the same results."""
     from lie_codegen.codegen.package import render_library
     from lie_codegen.lowering.casadi_arithmetic import function_of
 
+    namespace = _namespace(namespace, kernels)
     signatures = render_library(namespace, kernels).signatures  # refuses what C would refuse
     check_names(signatures)
     functions = [
@@ -88,7 +87,13 @@ def interpreted(kernels: Sequence[Kernel], *, namespace: str) -> Library:
     return Library(namespace, functions, None)
 
 
-def _request(namespace: str, definition: str, options: Mapping[str, Any], compiler: Compiler) -> str:
+def _namespace(given: str | None, kernels: Sequence[Kernel]) -> str:
+    if given is None and not kernels:
+        raise CodegenError("no kernel given")
+    return kernels[0].namespace if given is None else given
+
+
+def _request(namespace: str | None, definition: str, options: Mapping[str, Any], compiler: Compiler) -> str:
     return digest(
         {
             "namespace": namespace,
@@ -106,13 +111,14 @@ def _request(namespace: str, definition: str, options: Mapping[str, Any], compil
 
 def _compile(
     folder: Path,
-    namespace: str,
+    namespace: str | None,
     kernels: Sequence[Kernel],
     compilers: Sequence[Compiler],
     requests: Sequence[str],
 ) -> Library:
     from lie_codegen.codegen.package import render_library
 
+    namespace = _namespace(namespace, kernels)
     sources = render_library(namespace, kernels)
     check_names(sources.signatures)
     flags = flags_for(sources.statements)
@@ -140,7 +146,7 @@ def _compile(
                     raise
             failure = failure or error
             continue
-        library = _open(namespace, entry)
+        library = _open(entry)
         cache.evict(folder, keep=key)
         return library
     raise failure or CompileError("no compiler to try")
@@ -157,7 +163,7 @@ def _fill(
         return cache.store_entry(folder, key, home / output, namespace, sources.signatures)
 
 
-def _open(namespace: str, entry: cache.Entry) -> Library:
+def _open(entry: cache.Entry) -> Library:
     shared = load_library(entry.library)
     functions = [Compiled(signature, CtypesBackend(shared, signature), compiled=True) for signature in entry.signatures]
-    return Library(namespace, functions, entry.library)
+    return Library(entry.namespace, functions, entry.library)

@@ -35,6 +35,7 @@ _STALE_SECONDS = 86_400.0
 class Entry:
     """A verified library on disk."""
 
+    namespace: str
     library: Path
     signatures: tuple[Signature, ...]
 
@@ -103,7 +104,7 @@ def find_entry(folder: Path, key: str) -> Entry | None:
     home = folder / "entries" / key
     data = _read_json(home / "entry.json")
     try:
-        name, expected = str(data["file"]), str(data["sha256"])
+        namespace, name, expected = str(data["namespace"]), str(data["file"]), str(data["sha256"])
         signatures = tuple(Signature.from_json(each) for each in data["signatures"])
         if "/" in name or "\\" in name or _file_digest(home / name) != expected:
             return None
@@ -111,10 +112,10 @@ def find_entry(folder: Path, key: str) -> Entry | None:
         return None
     with contextlib.suppress(OSError):
         os.utime(home / "entry.json")  # the time of last use, for eviction
-    return Entry(home / name, signatures)
+    return Entry(namespace, home / name, signatures)
 
 
-def store_entry(folder: Path, key: str, built: Path, stem: str, signatures: Sequence[Signature]) -> Entry:
+def store_entry(folder: Path, key: str, built: Path, namespace: str, signatures: Sequence[Signature]) -> Entry:
     """Move a library just built (on the same disk) into the cache.
 
     Raises:
@@ -123,11 +124,16 @@ def store_entry(folder: Path, key: str, built: Path, stem: str, signatures: Sequ
     content = _file_digest(built)
     home = folder / "entries" / key
     home.mkdir(mode=0o700, parents=True, exist_ok=True)
-    library = home / f"{stem}-{content[:32]}{built.suffix}"
+    library = home / f"{namespace}-{content[:32]}{built.suffix}"
     os.replace(built, library)
-    data = {"file": library.name, "sha256": content, "signatures": [each.to_json() for each in signatures]}
+    data = {
+        "namespace": namespace,
+        "file": library.name,
+        "sha256": content,
+        "signatures": [each.to_json() for each in signatures],
+    }
     write_json(home / "entry.json", data)
-    return Entry(library, tuple(signatures))
+    return Entry(namespace, library, tuple(signatures))
 
 
 def store_request(folder: Path, request: str, key: str) -> None:

@@ -79,11 +79,12 @@ class Compiled:
         """The loop state <- f(state, ...), n times, in C; the state is the first input and the first output.
 
         Args:
-            *args, **named: the start, then the other inputs: with a leading axis of length n, one a step,
-                or the same for all steps.
+            *args: the start, then the other inputs: with a leading axis of length n, one entry a step, or the
+                same for all steps.
             n: number of steps, a multiple of `every`.
             every: steps from one stored state to the next.
             out: as for a call, of the shape returned.
+            **named: inputs by name.
 
         Returns:
             (n // every + 1, *shape): the start, then every `every`-th state.

@@ -49,7 +49,7 @@ def templates_digest() -> str:
 def cpu_identity() -> str:
     """Model and features of the processor, for which -march=native compiles."""
     wanted = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa", "cpu")
-    lines = []
+    lines: list[str] = []
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
             for line in file:

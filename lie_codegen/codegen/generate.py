@@ -1,0 +1,41 @@
+"""Kernels -> a C package on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.codegen.package import render_package
+from lie_codegen.codegen.views import PackageMetadata
+from lie_codegen.codegen.write import write_package
+from lie_codegen.kernels.kernel import Kernel
+
+
+def generate(
+    kernels: Sequence[Kernel],
+    folder: str | Path,
+    *,
+    namespace: str,
+    metadata: PackageMetadata | Mapping[str, Any] | None = None,
+) -> Path:
+    """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
+
+    Args:
+        kernels: all of one namespace.
+        folder: created if need be; an existing one must be empty or hold an unedited package of ours.
+        namespace: prefix of every symbol, and the name of the header and the CMake target.
+        metadata: what the documentation says about the group: `PackageMetadata` or a mapping of its fields.
+
+    Raises:
+        CodegenError: a kernel cannot become C, or two symbols collide.
+        IdentifierError: the namespace is no C identifier.
+        OutputFolderError: the folder cannot be written, or holds files that are not ours.
+    """
+    return write_package(render_package(namespace, kernels, _metadata(metadata)), folder)
+
+
+def _metadata(given: PackageMetadata | Mapping[str, Any] | None) -> PackageMetadata:
+    if given is None or isinstance(given, PackageMetadata):
+        return given or PackageMetadata()
+    return PackageMetadata(**{key: tuple(value) if isinstance(value, list) else value for key, value in given.items()})
