@@ -78,6 +78,10 @@ class CodegenError(InputError):
     """A kernel cannot become C as it is written; names the operation or the symbol."""
 
 
+class IncompatibleError(InputError):
+    """An error function and a transport map do not satisfy (A2); carries the residual."""
+
+
 class ComputationError(LieCodegenError, RuntimeError):
     """The input was right and the computation failed."""
 
@@ -108,3 +112,7 @@ class NoCompilerWarning(UserWarning):
 
 class CacheWarning(UserWarning):
     """The cache folder cannot be used; what is built lives in a private temporary folder."""
+
+
+class InertiaWarning(UserWarning):
+    """An inertia that is a legal metric and belongs to no rigid body: the triangle inequality fails."""
