@@ -1,14 +1,14 @@
 """Group files: a TOML description of a group, read as data.
 
-    name = "osc4"
-    description = "oscillator algebra"      # optional
-    labels = ["J", "P", "Q", "Z"]
-    units = ["rad", "m", "m", "m^2"]        # optional
-    [brackets]                              # either brackets ...
-    "J,P" = { Q = 1 }
-    [matrices]                              # ... or matrices, one for each label
-    J = [[0, "-1/2"], ["sqrt(3)/2", 0]]
-    [metadata]                              # optional, free text, kept and not interpreted
+name = "osc4"
+description = "oscillator algebra"      # optional
+labels = ["J", "P", "Q", "Z"]
+units = ["rad", "m", "m", "m^2"]        # optional
+[brackets]                              # either brackets ...
+"J,P" = { Q = 1 }
+[matrices]                              # ... or matrices, one for each label
+J = [[0, "-1/2"], ["sqrt(3)/2", 0]]
+[metadata]                              # optional, free text, kept and not interpreted
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from decimal import Decimal
-from pathlib import Path
 from typing import Any
 
 from lie_codegen.algebra.exact import Number, exact_number
@@ -28,25 +27,15 @@ _KEYS = ("name", "labels", "description", "source", "units", "matrices", "bracke
 _MAX_BYTES = 1_000_000
 
 
-def load_group_file(path: Path) -> MatrixGroup:
-    """The group a TOML file describes.
+def parse_group_file(data: bytes, where: str) -> MatrixGroup:
+    """The group a TOML text describes; `where` names it in messages.
 
     Raises:
-        GroupFileError: the file cannot be read or parsed, a key is unknown or missing, an entry is not a number; the
-            message names file, key and column.
-        InputError: what the definition itself violates (closure, independence, Jacobi, names), prefixed by the file.
+        GroupFileError: not TOML, a key unknown or missing, an entry that is not a number; names file, key and column.
+        InputError: what the definition itself violates (closure, independence, Jacobi, names), prefixed by `where`.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise GroupFileError(f"{path}: cannot be read: {error.strerror or error}") from None
     if len(data) > _MAX_BYTES:
-        raise GroupFileError(f"{path}: {len(data)} bytes; a group file has at most {_MAX_BYTES}")
-    return parse_group_file(data, str(path))
-
-
-def parse_group_file(data: bytes, where: str) -> MatrixGroup:
-    """The group a TOML text describes; `where` names it in messages."""
+        raise GroupFileError(f"{where}: {len(data)} bytes; a group file has at most {_MAX_BYTES}")
     try:
         table = tomllib.loads(data.decode("utf-8"), parse_float=Decimal)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -150,7 +139,7 @@ def _brackets(value: Any, labels: list[str], where: str) -> dict[tuple[str, str]
         key = f"brackets.{pair!r}"
         names = tuple(part.strip() for part in pair.strip("[] ").split(","))
         if len(names) != 2:
-            raise GroupFileError(f"{where}: key {key} must name two labels, as in \"x,y\"")
+            raise GroupFileError(f'{where}: key {key} must name two labels, as in "x,y"')
         if not isinstance(combination, dict):
             raise GroupFileError(f"{where}: key {key} must be a table of label = coefficient, got {combination!r}")
         for label in (*names, *combination):

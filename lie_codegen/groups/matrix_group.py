@@ -68,8 +68,8 @@ class MatrixGroup:
         return array
 
     @cached_property
-    def _coordinates(self) -> Array:
-        """(n, 2 d^2) left inverse of the map from coordinates to stacked real and imaginary parts."""
+    def coordinate_rows(self) -> Array:
+        """(n, 2 d^2) coordinates from the real parts of all entries, row by row, then the imaginary parts."""
         stacked = np.array([np.concatenate([m.real.ravel(), m.imag.ravel()]) for m in self.basis])
         return np.linalg.pinv(stacked.T)
 
@@ -111,7 +111,7 @@ class MatrixGroup:
         """Coordinates of the element of the algebra nearest to A (Frobenius): (..., d, d) -> (..., n)."""
         matrix = np.asarray(A, dtype=complex)
         flat = matrix.reshape(*matrix.shape[:-2], -1)
-        return np.concatenate([flat.real, flat.imag], axis=-1) @ self._coordinates.T
+        return np.concatenate([flat.real, flat.imag], axis=-1) @ self.coordinate_rows.T
 
     def reorder(self, labels: Sequence[str]) -> MatrixGroup:
         """The same group with its basis in another order.

@@ -1,0 +1,45 @@
+"""lie_codegen: from a Lie algebra to fast C.
+
+The names below are the front door; each is imported when first used, so that calling compiled functions
+imports neither SymPy nor CasADi.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_FRONT_DOOR = {
+    "group": "lie_codegen.groups.catalogue_load",
+    "group_names": "lie_codegen.groups.catalogue_names",
+    "from_matrices": "lie_codegen.groups.definition",
+    "from_brackets": "lie_codegen.groups.definition",
+    "MatrixGroup": "lie_codegen.groups.matrix_group",
+    "wei_norman": "lie_codegen.kernels.wei_norman",
+    "controllability": "lie_codegen.groups.controllability",
+    "Kernel": "lie_codegen.kernels.kernel",
+    "Port": "lie_codegen.kernels.kernel",
+    "group_kernels": "lie_codegen.kernels.group_kernels",
+    "build": "lie_codegen.runtime.front",
+    "generate": "lie_codegen.runtime.front",
+    "simulate": "lie_codegen.simulation.flow",
+    "steer": "lie_codegen.steering.front",
+}
+
+__all__ = ["__version__", "errors", *_FRONT_DOOR]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "errors":
+        return import_module("lie_codegen.errors")
+    if name not in _FRONT_DOOR:
+        raise AttributeError(f"module 'lie_codegen' has no attribute {name!r}")
+    value = getattr(import_module(_FRONT_DOOR[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,18 @@
+"""lc.controllability: the growth report of a group's controls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lie_codegen.algebra.controllability import Controllability
+from lie_codegen.algebra.controllability import controllability as algebra_controllability
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+
+def controllability(group: MatrixGroup, controls: Sequence[str | int]) -> Controllability:
+    """Whether X' = X sum u_i A_i over the given controls reaches every X, with the growth vector; exact.
+
+    Raises:
+        InputError: an unknown or repeated control, or none.
+    """
+    return algebra_controllability(group.algebra, controls)

@@ -1,0 +1,105 @@
+"""lc.build and lc.generate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lie_codegen.errors import InputError
+from lie_codegen.runtime.build import build_kernels
+from lie_codegen.runtime.library import Library
+
+if TYPE_CHECKING:
+    from lie_codegen.groups.matrix_group import MatrixGroup
+    from lie_codegen.kernels.kernel import Kernel
+
+    Buildable = MatrixGroup | Kernel | Sequence[Kernel] | str | Path
+
+
+def build(what: Buildable) -> Library:
+    """Compiled kernels, from the cache where they are there.
+
+    Args:
+        what: a group (all its kernels), a catalogue name or the path of a group file (the same, without importing SymPy
+            when the cache has it), a Kernel, or several Kernels of one namespace.
+
+    Raises:
+        InputError: if it is none of these, or kernels of several namespaces or with repeated names are given.
+        CompileError: with the command and the compiler's own words.
+    """
+    if isinstance(what, str | Path):
+        return _build_named(what)
+    group, kernels = _group_or_kernels(what)
+    if group is None:
+        namespace = _namespace(kernels)
+        return build_kernels(lambda: kernels, namespace=namespace, definition=None)
+    return build_kernels(lambda: _kernels_of(group), namespace=group.name, definition=f"group\n{group.definition}")
+
+
+def generate(what: Buildable, folder: str | Path) -> Path:
+    """The C package of a group or of kernels, written as a folder; returns its path.
+
+    Raises:
+        InputError: as `build`.
+        OutputFolderError: the folder cannot be written, or holds files that are not ours.
+    """
+    from lie_codegen.codegen.package import generate as generate_package
+    from lie_codegen.codegen.views import PackageMetadata
+
+    if isinstance(what, str | Path):
+        from lie_codegen.groups.catalogue_load import group as load
+
+        what = load(what)
+    group, kernels = _group_or_kernels(what)
+    if group is None:
+        generate_package(kernels, Path(folder), namespace=_namespace(kernels))
+        return Path(folder)
+    metadata = PackageMetadata(title=group.name, description=group.description, labels=group.labels, units=group.units)
+    generate_package(_kernels_of(group), Path(folder), namespace=group.name, metadata=metadata)
+    return Path(folder)
+
+
+def _build_named(what: str | Path) -> Library:
+    from lie_codegen.groups.catalogue_names import group_path
+
+    path = group_path(what)
+
+    def kernels() -> Sequence[Kernel]:
+        from lie_codegen.groups.catalogue_load import group
+
+        return _kernels_of(group(what))
+
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    if not text:
+        return build_kernels(kernels, namespace=path.stem, definition=None)
+    return build_kernels(kernels, namespace=path.stem, definition=f"file\n{text}")
+
+
+def _kernels_of(group: MatrixGroup) -> tuple[Kernel, ...]:
+    from lie_codegen.kernels.group_kernels import group_kernels
+
+    return group_kernels(group)
+
+
+def _group_or_kernels(what: Any) -> tuple[MatrixGroup | None, tuple[Kernel, ...]]:
+    from lie_codegen.groups.matrix_group import MatrixGroup
+    from lie_codegen.kernels.kernel import Kernel
+
+    if isinstance(what, MatrixGroup):
+        return what, ()
+    kernels = (what,) if isinstance(what, Kernel) else tuple(what) if isinstance(what, Sequence) else ()
+    if not kernels or not all(isinstance(kernel, Kernel) for kernel in kernels):
+        raise InputError(f"expected a group, its name or file, a Kernel or several Kernels, got {what!r}")
+    return None, kernels
+
+
+def _namespace(kernels: Sequence[Kernel]) -> str:
+    namespaces = sorted({kernel.namespace for kernel in kernels})
+    if len(namespaces) > 1:
+        raise InputError(f"kernels of several namespaces ({', '.join(namespaces)}): build each on its own")
+    names = [kernel.name for kernel in kernels]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InputError(f"kernel names repeated: {', '.join(repeated)}; rename one of each")
+    return namespaces[0]

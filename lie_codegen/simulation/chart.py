@@ -1,0 +1,61 @@
+"""Wei-Norman coordinates along a trajectory, and the end of their chart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import ChartError
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.simulation.grid import Grid
+from lie_codegen.simulation.libraries import integrators
+
+Array = NDArray[Any]
+
+_AGREEMENT = 1e-9
+
+
+def follow_chart(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], X: Array) -> Array:
+    """(k, n) coordinates with X(t) = X(t_0) Phi(g(t)), g(t_0) = 0: g' = M(g) u, corrected to X by Newton's method.
+
+    Raises:
+        ChartError: where the chart ends, naming the time.
+    """
+    lib = integrators(group)
+    u0, um, u1 = samples
+    with np.errstate(all="ignore"):
+        every = lib.wei_norman_step.scan(np.zeros(group.dim), n=grid.steps, every=1, u0=u0, um=um, u1=u1, h=grid.h)
+        g = np.array(every[grid.outputs])
+        relative = np.linalg.inv(X[0]) @ X
+        g = newton(group, g, relative)
+        off = mismatch(group, g, relative)
+    bad = np.flatnonzero(~(off <= _AGREEMENT * np.maximum(1.0, np.max(np.abs(relative), axis=(1, 2)))))
+    if len(bad):
+        last = grid.knots[grid.at[max(bad[0] - 1, 0)]]
+        raise ChartError(
+            f"{group.name}: the Wei-Norman chart in the order {', '.join(group.labels)} ends between t = {last:.6g} and "
+            f"t = {grid.knots[grid.at[bad[0]]]:.6g}; the trajectory itself (.X) is right; restart the coordinates "
+            "before that time or reorder the basis"
+        )
+    return g
+
+
+def newton(group: MatrixGroup, g: Array, X: Array, iterations: int = 4) -> Array:
+    """Improves (k, n) coordinates g towards Phi(g) = X by g += M(g) vee(Phi(g)^-1 X - I)."""
+    lib = integrators(group)
+    identity = np.eye(group.degree)
+    for _ in range(iterations):
+        finite = np.all(np.isfinite(g), axis=1)
+        safe = np.where(finite[:, None], g, 0.0)
+        residual = group.project(np.linalg.inv(lib.product_exp.batch(safe)) @ X - identity)
+        step = np.einsum("kij,kj->ki", lib.wei_norman_matrix.batch(safe), residual)
+        g = np.where(finite[:, None] & (np.linalg.norm(residual, axis=1) < 0.5)[:, None], g + step, g)
+    return g
+
+
+def mismatch(group: MatrixGroup, g: Array, X: Array) -> Array:
+    """(k,) max |Phi(g) - X|; NaN where g is not finite."""
+    phi = integrators(group).product_exp.batch(np.ascontiguousarray(g))
+    return np.asarray(np.max(np.abs(phi - X), axis=(1, 2)))

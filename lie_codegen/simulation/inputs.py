@@ -1,0 +1,68 @@
+"""What drives a system: u(t) as a function, a constant, or samples, brought to one form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Array = NDArray[np.float64]
+
+
+class Signal:
+    """u(t) on (n,) components, vectorised over t, with the times at which it is not smooth."""
+
+    def __init__(self, evaluate: Callable[[Array], Array], breakpoints: Array) -> None:
+        self.evaluate = evaluate
+        self.breakpoints = breakpoints
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        return self.evaluate(t)
+
+
+def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
+    """A Signal from what the caller gave.
+
+    Args:
+        u: a callable u(t) -> (n,) (or vectorised: (k,) -> (k, n)), with an optional attribute `breakpoints`;
+            an (n,) constant; or (len(t), n) samples at the times t, joined by straight lines.
+
+    Raises:
+        ShapeError: naming the shape that was expected.
+        NotFiniteError: if u holds NaN or infinity.
+    """
+    if callable(u):
+        return Signal(_vectorised(group, u, t), np.asarray(getattr(u, "breakpoints", ()), dtype=float))
+    values = np.asarray(u, dtype=float)
+    if not np.all(np.isfinite(values)):
+        raise NotFiniteError(f"simulate({group.name}): u holds NaN or infinity")
+    if values.shape == (group.dim,):
+        return Signal(lambda s: np.broadcast_to(values, (len(s), group.dim)), np.empty(0))
+    if values.shape == (len(t), group.dim):
+        columns = values.T
+        return Signal(lambda s: np.stack([np.interp(s, t, column) for column in columns], axis=-1), t)
+    raise ShapeError(
+        f"simulate({group.name}): u has shape {values.shape}; give a function of t, a constant ({group.dim},), or "
+        f"samples ({len(t)}, {group.dim}) at the times t"
+    )
+
+
+def _vectorised(group: MatrixGroup, u: Callable[[Any], Any], t: Array) -> Callable[[Array], Array]:
+    probe = t[: min(len(t), 3)]
+    try:
+        together: Any = np.asarray(u(probe), dtype=float)
+    except (TypeError, ValueError, InputError):
+        together = None
+    expected = (len(probe), group.dim)
+    single = np.asarray(u(float(probe[0])), dtype=float)
+    if single.shape != (group.dim,):
+        raise ShapeError(f"simulate({group.name}): u(t) has shape {single.shape}; it must be ({group.dim},)")
+    if together is not None and together.shape == expected and np.array_equal(together[0], single):
+        return lambda s: np.asarray(u(s), dtype=float)
+    return lambda s: np.array([u(float(moment)) for moment in s], dtype=float).reshape(len(s), group.dim)

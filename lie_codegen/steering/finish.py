@@ -1,0 +1,60 @@
+"""Controls -> Plan: the true system is always simulated; a method's own claim is never taken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+
+from lie_codegen.simulation.flow import simulate
+from lie_codegen.simulation.metric import distance
+from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.task import Task
+
+_NODES, _WEIGHTS = leggauss(10)
+_PANELS = 400
+
+
+def energy(u: Controls, duration: float) -> float:
+    """int_0^duration |u|^2 dt by Gauss-Legendre quadrature, split at the breakpoints of u."""
+    inner = u.breakpoints[(u.breakpoints > 0) & (u.breakpoints < duration)]
+    knots = np.unique(np.concatenate([[0.0], inner, [duration]]))
+    parts = max(1, -(-_PANELS // (len(knots) - 1)))
+    edges = np.concatenate([np.linspace(a, b, parts, endpoint=False) for a, b in zip(knots, knots[1:], strict=False)])
+    widths = np.diff(np.append(edges, duration))
+    t = edges[:, None] + widths[:, None] * (1 + _NODES) / 2
+    values = np.sum(u(t.ravel()) ** 2, axis=1).reshape(t.shape)
+    return float(np.sum(values @ _WEIGHTS * widths / 2))
+
+
+def finish(
+    task: Task,
+    method: str,
+    u: Controls,
+    details: Mapping[str, Any],
+    seconds: Mapping[str, float],
+    *,
+    solved: Status,
+    otherwise: Status,
+) -> Plan:
+    """Simulates the true system under u and reports where it ends."""
+    started = time.perf_counter()
+    run = simulate(task.group, u, t=[0.0, task.duration])
+    error = distance(task.group, task.target, run.X[-1])
+    return Plan(
+        group=task.group,
+        target=task.target,
+        controls=tuple(task.group.labels[i] for i in task.controls),
+        duration=task.duration,
+        method=method,
+        u=u,
+        cost=energy(u, task.duration),
+        X_final=run.X[-1],
+        error=error,
+        status=solved if error <= task.tolerance else otherwise,
+        seconds={**seconds, "simulate": time.perf_counter() - started},
+        details=details,
+    )

@@ -1,0 +1,75 @@
+"""Plan: what steering returns, whatever the method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Array = NDArray[Any]
+
+
+class Status(Enum):
+    """How a plan ended; the value says what it means for the user."""
+
+    SOLVED = "solved: the endpoint error is below the tolerance"
+    APPROXIMATE = "approximate: the method reaches the target up to its own order; see .error"
+    LOCAL = "solved: a local minimum of the energy, the best of the starts tried; more starts may find a better one"
+    NOT_CONVERGED = "not converged: the best found is returned, see .error; try a longer duration or more starts"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class Controls:
+    """u(t) on all n components (zeros where there is no control), for a float or an array of times.
+
+    Attributes:
+        breakpoints: times at which u is not smooth.
+    """
+
+    def __init__(self, evaluate: Callable[[Array], Array], breakpoints: ArrayLike) -> None:
+        self._evaluate = evaluate
+        self.breakpoints = np.asarray(breakpoints, dtype=float)
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """u at t: (n,) for a number, (k, n) for (k,) times."""
+        times = np.asarray(t, dtype=float)
+        values = self._evaluate(np.atleast_1d(times))
+        return values[0] if times.ndim == 0 else values
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A manoeuvre.
+
+    Attributes:
+        group, target, controls, duration: the task; controls are the labels of the actuated basis elements.
+        method: the method that made it.
+        u: u(t) -> (n,), vectorised.
+        cost: int_0^duration |u|^2 dt.
+        X_final: where the true system ends.
+        error: |log(target^-1 X_final)|, on SO(3) the attitude error in rad.
+        status: see `Status`.
+        seconds: wall time spent, by stage.
+        details: what the method adds (its parameters, starts tried, discretisation).
+    """
+
+    group: MatrixGroup = field(repr=False)
+    target: Array = field(repr=False)
+    controls: tuple[str, ...]
+    duration: float
+    method: str
+    u: Controls = field(repr=False)
+    cost: float
+    X_final: Array = field(repr=False)
+    error: float
+    status: Status
+    seconds: Mapping[str, float]
+    details: Mapping[str, Any]
