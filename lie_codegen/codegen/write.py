@@ -103,14 +103,17 @@ def _swap(fresh: Path, target: Path, replaced: tuple[str, ...]) -> None:
     if not target.exists():
         fresh.rename(target)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{target.name}.old.", dir=target.parent))
-    target.rename(old)
+    shelter = Path(tempfile.mkdtemp(prefix=f".{target.name}.old.", dir=target.parent))
+    old = target.rename(shelter / target.name)
     try:
         fresh.rename(target)
     except OSError:
         old.rename(target)
+        shelter.rmdir()
         raise
     _remove(old, replaced)
+    with contextlib.suppress(OSError):
+        shelter.rmdir()
 
 
 def _remove(folder: Path, files: Mapping[str, str] | tuple[str, ...]) -> None:

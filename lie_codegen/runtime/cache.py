@@ -123,7 +123,8 @@ def store_entry(folder: Path, key: str, built: Path, namespace: str, signatures:
     """
     content = _file_digest(built)
     home = folder / "entries" / key
-    home.mkdir(mode=0o700, parents=True, exist_ok=True)
+    for part in (home.parent, home):
+        part.mkdir(mode=0o700, exist_ok=True)
     library = home / f"{namespace}-{content[:32]}{built.suffix}"
     os.replace(built, library)
     data = {
@@ -155,7 +156,7 @@ def lock(folder: Path, key: str) -> Iterator[None]:
     from filelock import FileLock
 
     locks = folder / "locks"
-    locks.mkdir(mode=0o700, parents=True, exist_ok=True)
+    locks.mkdir(mode=0o700, exist_ok=True)
     with FileLock(locks / f"{key}.lock"):
         yield
 
@@ -168,7 +169,7 @@ def scratch(folder: Path) -> Iterator[Path]:
         OSError: the folder cannot be written.
     """
     parent = folder / "scratch"
-    parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    parent.mkdir(mode=0o700, exist_ok=True)
     home = Path(tempfile.mkdtemp(prefix="build-", dir=parent))
     try:
         yield home
@@ -198,7 +199,7 @@ def write_json(path: Path, data: Any) -> None:
     Raises:
         OSError: it cannot be written; the old file is untouched.
     """
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    path.parent.mkdir(mode=0o700, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=".new-", dir=path.parent)
     try:
         with open(descriptor, "w", encoding="utf-8") as file:
