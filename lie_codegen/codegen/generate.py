@@ -38,4 +38,5 @@ def generate(
 def _metadata(given: PackageMetadata | Mapping[str, Any] | None) -> PackageMetadata:
     if given is None or isinstance(given, PackageMetadata):
         return given or PackageMetadata()
-    return PackageMetadata(**{key: tuple(value) if isinstance(value, list) else value for key, value in given.items()})
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in given.items()}
+    return PackageMetadata(**fields)

@@ -44,7 +44,7 @@ def generate(what: Buildable, folder: str | Path) -> Path:
         InputError: as `build`.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    from lie_codegen.codegen.package import generate as generate_package
+    from lie_codegen.codegen.generate import generate as generate_package
     from lie_codegen.codegen.views import PackageMetadata
 
     if isinstance(what, str | Path):
@@ -53,11 +53,9 @@ def generate(what: Buildable, folder: str | Path) -> Path:
         what = load(what)
     group, kernels = _group_or_kernels(what)
     if group is None:
-        generate_package(kernels, Path(folder), namespace=_namespace(kernels))
-        return Path(folder)
+        return generate_package(kernels, folder, namespace=_namespace(kernels))
     metadata = PackageMetadata(title=group.name, description=group.description, labels=group.labels, units=group.units)
-    generate_package(_kernels_of(group), Path(folder), namespace=group.name, metadata=metadata)
-    return Path(folder)
+    return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata)
 
 
 def _build_named(what: str | Path) -> Library:
@@ -72,8 +70,8 @@ def _build_named(what: str | Path) -> Library:
 
     text = path.read_text(encoding="utf-8") if path.is_file() else ""
     if not text:
-        return build_kernels(kernels, namespace=path.stem, definition=None)
-    return build_kernels(kernels, namespace=path.stem, definition=f"file\n{text}")
+        return build_kernels(kernels, definition=None)
+    return build_kernels(kernels, definition=f"file\n{text}")
 
 
 def _kernels_of(group: MatrixGroup) -> tuple[Kernel, ...]:
