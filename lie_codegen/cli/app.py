@@ -1,0 +1,42 @@
+"""The command line: lie-codegen list | show | new | check | generate | build | simulate | steer | reproduce | cache."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Any
+
+import typer
+
+from lie_codegen.cli import code, groups, motion
+from lie_codegen.cli.output import complain
+from lie_codegen.errors import InputError, LieCodegenError
+
+app = typer.Typer(
+    name="lie-codegen",
+    help="From a Lie algebra to fast C: exact Wei-Norman equations, generated C, simulation and steering.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+for _part in (groups.commands, code.commands, motion.commands):
+    for _command in _part:
+        app.command()(_command)
+
+
+def _show_warning(message: Any, category: Any, *rest: Any) -> None:
+    complain(f"lie-codegen: warning: {message}")
+
+
+def main() -> None:
+    """Entry point: exit status 2 for bad input with one line, 1 for a computation that failed."""
+    warnings.showwarning = _show_warning
+    try:
+        app()
+    except InputError as error:
+        complain(f"lie-codegen: {error}")
+        sys.exit(2)
+    except LieCodegenError as error:
+        complain(f"lie-codegen: {error}")
+        sys.exit(1)

@@ -1,0 +1,130 @@
+"""Commands about motion: simulate, steer, reproduce."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lie_codegen.cli.groups import GroupName, Json
+from lie_codegen.cli.output import emit, progress
+from lie_codegen.errors import InputError, OutputFolderError, ShapeError
+
+_Optional = typer.Option
+
+
+def simulate(
+    group: GroupName,
+    u: Annotated[list[str], _Optional("--u", help='Formula of t, one for each basis element: --u "cos(t)" --u 0 ...')],
+    end: Annotated[float, _Optional(help="Final time in seconds.")] = 10.0,
+    eps: Annotated[float, _Optional(help="Scale of u.")] = 1.0,
+    samples: Annotated[int, _Optional(help="Number of output times.")] = 101,
+    out: Annotated[Path | None, _Optional(help="CSV file for t and the entries of X, row by row.")] = None,
+    json: Json = False,
+) -> None:
+    """Simulate X' = X hat(eps u(t)) from the identity."""
+    import numpy as np
+
+    from lie_codegen.groups.catalogue_load import group as load
+    from lie_codegen.simulation.flow import simulate as run_simulation
+    from lie_codegen.simulation.formulas import formula_input
+
+    g = load(group)
+    if samples < 2 or not end > 0:
+        raise InputError("simulate: --samples must be at least 2 and --end positive")
+    started = time.perf_counter()
+    run = run_simulation(g, formula_input(g, u), t=np.linspace(0, end, samples), eps=eps)
+    seconds = time.perf_counter() - started
+    if out is not None:
+        _write_csv(out, run.t, run.X)
+    data: dict[str, Any] = {
+        "group": g.name,
+        "steps": run.steps,
+        "error_estimate": run.error_estimate,
+        "X_final": run.X[-1],
+        "seconds": seconds,
+    }
+    if out is None and json:
+        data.update(t=run.t, X=run.X)
+    text = (
+        f"{g.name}: {run.steps} steps, error below {run.error_estimate:.1e}, {seconds:.2f} s\nX({end:g}) =\n{run.X[-1]}"
+    )
+    emit(text + (f"\nwrote {out}" if out else ""), data, json)
+
+
+def _write_csv(path: Path, t: Any, X: Any) -> None:
+    import numpy as np
+
+    flat = X.reshape(len(t), -1)
+    if np.iscomplexobj(flat):
+        flat = flat.view(float)
+    try:
+        np.savetxt(path, np.column_stack([t, flat]), delimiter=",", header="t, entries of X row by row", fmt="%.17g")
+    except OSError as error:
+        raise OutputFolderError(f"{path} cannot be written: {error.strerror or error}") from None
+
+
+def steer(
+    group: GroupName,
+    target: Annotated[
+        str, _Optional(help="Coordinates of the second kind: comma-separated numbers, pi and sqrt allowed.")
+    ],
+    controls: Annotated[str, _Optional(help="Comma-separated labels of the actuated basis elements.")],
+    duration: Annotated[float, _Optional(help="Seconds.")] = 1.0,
+    method: Annotated[str, _Optional(help="Steering method.")] = "optimal",
+    samples: Annotated[int, _Optional(help="Number of control samples in the JSON object.")] = 101,
+    json: Json = False,
+) -> None:
+    """Steer from the identity to a target."""
+    import numpy as np
+
+    from lie_codegen.algebra.expression import parse_number
+    from lie_codegen.groups.catalogue_load import group as load
+    from lie_codegen.steering.front import steer as plan_steering
+
+    g = load(group)
+    numbers = [parse_number(part) for part in target.split(",")]
+    if len(numbers) != g.dim or any(number.is_real is not True for number in numbers):
+        raise ShapeError(f"steer: --target needs {g.dim} real numbers for {', '.join(g.labels)}, got {target!r}")
+    names = [name.strip() for name in controls.split(",")]
+    plan = plan_steering(g, [float(number) for number in numbers], names, duration, method)
+    t = np.linspace(0, duration, max(2, samples))
+    data = {
+        "group": g.name,
+        "method": plan.method,
+        "status": plan.status,
+        "cost": plan.cost,
+        "error": plan.error,
+        "X_final": plan.X_final,
+        "seconds": plan.seconds,
+        "details": plan.details,
+        "t": t,
+        "u": plan.u(t),
+    }
+    text = f"{g.name}, {plan.method}: energy {plan.cost:.9g}, endpoint error {plan.error:.3g}\n{plan.status}"
+    emit(text, data, json)
+
+
+def reproduce(
+    figure: Annotated[str, typer.Argument(help="Name of the figure; 'list' names them.")] = "satellite",
+    out: Annotated[Path, _Optional(help="Folder for the picture and its numbers.")] = Path("results"),
+    json: Json = False,
+) -> None:
+    """Reproduce a figure of the papers: one picture, one JSON of numbers."""
+    from lie_codegen.gallery.registry import TARGETS
+    from lie_codegen.gallery.registry import reproduce as run_target
+
+    if figure == "list":
+        names = {each.name: each.about for each in TARGETS}
+        emit("\n".join(f"{name:24} {about}" for name, about in names.items()), {"figures": names}, json)
+        return
+    with progress(f"reproduce {figure}") as report:
+        result = run_target(figure, out, report)
+    lines = [f"  {name:28} {value}" for name, value in result.numbers.items()]
+    text = "\n".join([*lines, f"picture: {result.picture.resolve()}"])
+    emit(text, {"figure": result.name, "picture": result.picture.resolve(), "numbers": result.numbers}, json)
+
+
+commands = (simulate, steer, reproduce)

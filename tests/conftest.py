@@ -1,0 +1,28 @@
+"""One cache of compiled libraries for the whole run, shared by all workers and thrown away at the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput"):
+        config.lie_codegen_cache = tempfile.mkdtemp(prefix="lie-codegen-tests-")
+        os.environ["LIE_CODEGEN_CACHE"] = config.lie_codegen_cache
+        os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    folder = getattr(config, "lie_codegen_cache", None)
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    return Path(__file__).resolve().parent.parent

@@ -1,0 +1,112 @@
+"""The command line as a user runs it: exit status, stdout, stderr, files."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def run(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    root = str(Path(__file__).resolve().parent.parent)
+    return subprocess.run(
+        [sys.executable, "-m", "lie_codegen", *arguments],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": root, **environment},
+        timeout=300,
+    )
+
+
+def test_list_and_show_print_one_json_object(tmp_path: Path) -> None:
+    groups = json.loads(run("list", "--json", cwd=tmp_path).stdout)["groups"]
+    assert {"so3", "se2", "se3", "su2", "sl2", "h3"} <= {group["name"] for group in groups}
+    shown = json.loads(run("show", "so3", "--json", cwd=tmp_path).stdout)
+    assert shown["determinant_of_inverse"] == "cos(g2)"
+    assert shown["brackets"]["[w1, w2]"] == "w3"
+
+
+def test_new_writes_a_file_that_check_proves_and_generate_takes(tmp_path: Path) -> None:
+    assert run("new", "mine", cwd=tmp_path).returncode == 0
+    assert "proved exactly" in run("check", "mine.toml", cwd=tmp_path).stdout
+    assert run("new", "mine", cwd=tmp_path).returncode == 2, "an existing file is not overwritten"
+    done = run("generate", "mine.toml", "--out", "out", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {"include/mine.h", "src/mine.c", "example.c", "manifest.json"} <= set(json.loads(done.stdout)["files"])
+
+
+BAD_FILES = {
+    "not_closed": ('labels = ["a", "b"]\n[matrices]\na = [[0, 1], [0, 0]]\nb = [[0, 0], [1, 0]]', "not closed"),
+    "dependent": ('labels = ["a", "b"]\n[matrices]\na = [[0, 1], [0, 0]]\nb = [[0, 2], [0, 0]]', "linearly dependent"),
+    "jacobi": ('labels = ["a", "b", "c"]\n[brackets]\n"a,b" = { c = 1 }\n"a,c" = { a = 1 }', "(a, b, c)"),
+    "ragged": ('labels = ["a"]\n[matrices]\na = [[0, 1], [0]]', "row 2"),
+    "unknown_key": ('labels = ["a"]\ncolour = "red"\n[matrices]\na = [[0]]', "'colour'"),
+    "keyword": ('labels = ["int"]\n[matrices]\nint = [[1]]', "keyword"),
+    "expression": ('labels = ["a"]\n[matrices]\na = [["__import__(1)"]]', "column 1"),
+    "symbol": ('labels = ["a"]\n[matrices]\na = [["x + 1"]]', "column 1"),
+    "nan": ('labels = ["a"]\n[matrices]\na = [[nan]]', "matrices.a[1][1]"),
+    "both": ('labels = ["a"]\n[matrices]\na = [[1]]\n[brackets]\n', "exactly one"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", sorted(BAD_FILES))
+def test_a_bad_group_file_is_refused_with_status_2_and_one_line(case: str, tmp_path: Path) -> None:
+    body, expected = BAD_FILES[case]
+    path = tmp_path / f"{case}.toml"
+    path.write_text(f'name = "{case}"\n{body}\n')
+    done = run("check", path.name, cwd=tmp_path)
+    assert done.returncode == 2
+    assert expected in done.stderr
+    assert path.name in done.stderr, "the message names the file"
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--target", "0.1,0.2,0.3", "--controls", "w1"), "growth vector (1)"),
+        (("--target", "0.1,0.2", "--controls", "w1,w2"), "needs 3 real numbers"),
+        (("--target", "0.1,0.2,nan", "--controls", "w1,w2"), "'nan'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w9"), "'w9'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--duration", "0"), "duration"),
+        (("--target", "0.1,0,0.3", "--controls", "w1,w2", "--method", "four_phase"), "non-zero"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--method", "magic"), "'magic'"),
+    ],
+)
+def test_a_bad_steering_task_is_refused_with_status_2(
+    arguments: tuple[str, ...], expected: str, tmp_path: Path
+) -> None:
+    done = run("steer", "so3", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert expected in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_an_output_folder_that_is_not_ours_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    precious = tmp_path / "mine" / "thesis.txt"
+    precious.write_text("years of work")
+    done = run("generate", "h3", "--out", "mine", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "thesis.txt" in done.stderr
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert run("generate", "h3", "--out", "file/inside", cwd=tmp_path).returncode == 2
+
+
+def test_steer_and_simulate_print_json(tmp_path: Path) -> None:
+    steer = run("steer", "h3", "--target", "0,0,1", "--controls", "x,y", "--json", cwd=tmp_path)
+    plan = json.loads(steer.stdout)
+    assert abs(plan["cost"] - 12.566370614359172) < 1e-4
+    simulated = run("simulate", "so3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--end", "2*0+1", cwd=tmp_path)
+    assert simulated.returncode == 2, "numbers of options are plain numbers"
+    simulated = run("simulate", "so3", "--u", "0", "--u", "0", "--u", "pi/2", "--end", "1", "--json", cwd=tmp_path)
+    X = json.loads(simulated.stdout)["X_final"]
+    assert max(abs(X[0][1] + 1), abs(X[1][0] - 1), abs(X[0][0])) < 1e-12

@@ -1,0 +1,110 @@
+"""lc.simulate against matrix exponentials, against scipy's solve_ivp, and at the end of the chart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import lie_codegen as lc
+from lie_codegen.errors import ChartError, InputError, NotFiniteError, ShapeError
+
+NAMES = ("so3", "se2", "se3", "su2", "sl2", "h3")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_constant_input_is_one_exponential(name: str) -> None:
+    group = lc.group(name)
+    u = np.random.default_rng(1).normal(size=group.dim)
+    run = lc.simulate(group, u, eps=0.5, t=[0.0, 0.7, 2.0])
+    for t, X in zip(run.t, run.X, strict=True):
+        np.testing.assert_allclose(X, expm(0.5 * t * group.hat(u)), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_varying_input_agrees_with_a_general_solver(name: str) -> None:
+    group = lc.group(name)
+    rng = np.random.default_rng(2)
+    a, b = rng.normal(size=(2, group.dim))
+    X0 = expm(group.hat(rng.normal(size=group.dim)))
+
+    def u(t: float) -> np.ndarray:
+        return a * np.cos(3 * t) + b * np.sin(t) ** 2
+
+    d = group.degree
+    kind = X0.dtype
+    exact = solve_ivp(
+        lambda t, x: (x.reshape(d, d) @ group.hat(u(t))).ravel(),
+        (0, 2),
+        X0.ravel().astype(kind),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+    )
+    run = lc.simulate(group, u, t=[0.0, 2.0], X0=X0)
+    np.testing.assert_allclose(run.X[-1].ravel(), exact.y[:, -1], rtol=0, atol=3e-10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_coordinates_of_the_second_kind_follow_the_trajectory(name: str) -> None:
+    group = lc.group(name)
+    u = 0.3 * np.random.default_rng(3).normal(size=group.dim)
+    run = lc.simulate(group, u, t=np.linspace(0, 1, 11))
+    for g, X in zip(run.g, run.X, strict=True):
+        product = np.eye(group.degree)
+        for coordinate, matrix in zip(g, group.basis, strict=True):
+            product = product @ expm(coordinate * matrix)
+        np.testing.assert_allclose(product, X, rtol=0, atol=1e-12)
+
+
+def test_the_trajectory_stays_on_the_group_over_a_million_steps() -> None:
+    so3 = lc.group("so3")
+    run = lc.simulate(so3, lambda t: np.array([np.cos(t), np.sin(2 * t), 0.3]), t=[0.0, 2000.0], tolerance=1e-9)
+    assert run.steps > 30_000
+    assert np.max(np.abs(run.X[-1].T @ run.X[-1] - np.eye(3))) < 1e-11
+
+
+def test_the_end_of_the_chart_is_an_error_that_names_the_time_not_a_nan() -> None:
+    so3 = lc.group("so3")
+    run = lc.simulate(so3, [0.0, 1.0, 0.2], t=np.linspace(0, 4, 81))
+    assert np.all(np.isfinite(run.X))
+    with pytest.raises(ChartError, match=r"between t = 1\.\d+ and t = 1\.\d+"):
+        _ = run.g
+
+
+def test_breakpoints_are_stepped_on_exactly() -> None:
+    h3 = lc.group("h3")
+
+    class Bang:
+        breakpoints = (0.3, 0.7)
+
+        def __call__(self, t: float) -> np.ndarray:
+            return np.array([1.0, 0, 0]) if t < 0.3 else np.array([0, 2.0, 0]) if t < 0.7 else np.array([0, 0, 3.0])
+
+    run = lc.simulate(h3, Bang(), t=[0.0, 1.0])
+    x, y, z = h3.basis
+    np.testing.assert_allclose(run.X[-1], expm(0.3 * x) @ expm(0.8 * y) @ expm(0.9 * z), rtol=0, atol=1e-11)
+    assert run.steps < 5000
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"t": [0.0]}, ShapeError),
+        ({"t": [0.0, 0.0]}, InputError),
+        ({"t": [0.0, np.nan]}, NotFiniteError),
+        ({"u": [1.0, 2.0]}, ShapeError),
+        ({"u": [1.0, 2.0, np.inf]}, NotFiniteError),
+        ({"u": lambda t: np.full((*np.shape(t), 3), np.nan)}, NotFiniteError),
+        ({"u": lambda t: np.zeros(2)}, ShapeError),
+        ({"X0": np.eye(2)}, ShapeError),
+        ({"X0": np.full((3, 3), np.nan)}, NotFiniteError),
+        ({"eps": np.nan}, NotFiniteError),
+        ({"tolerance": 0.0}, InputError),
+    ],
+)
+def test_bad_input_is_named(change: dict[str, object], error: type[Exception]) -> None:
+    arguments: dict[str, object] = {"u": [1.0, 0.0, 0.0], "t": [0.0, 1.0], **change}
+    with pytest.raises(error):
+        lc.simulate(lc.group("so3"), arguments.pop("u"), **arguments)
