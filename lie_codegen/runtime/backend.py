@@ -15,6 +15,7 @@ import numpy as np
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.codegen.views import is_step
 from lie_codegen.errors import CacheError
+from lie_codegen.runtime.arguments import dtype_of
 
 Arrays = Sequence[np.ndarray[Any, Any]]
 
@@ -34,44 +35,53 @@ class Backend(Protocol):
         """state <- f(state, ...) `count` times, from inputs[0]; stores the start and every `every`-th state."""
 
 
+class _Workspace:
+    """Buffers of one call, with their addresses; asking numpy for an address costs more than a kernel."""
+
+    def __init__(self, signature: Signature) -> None:
+        self.inputs = [np.empty(port.shape, dtype_of(port)) for port in signature.inputs]
+        self.outputs = [np.empty(port.shape, dtype_of(port)) for port in signature.outputs]
+        self.input_pointers = _pointers(self.inputs)
+        self.output_pointers = _pointers(self.outputs)
+
+
 class CtypesBackend:
     """Functions of a shared library; the interpreter lock is released while they run."""
 
     def __init__(self, library: ctypes.CDLL, signature: Signature) -> None:
-        self._inputs = ctypes.c_void_p * len(signature.inputs)
-        self._outputs = ctypes.c_void_p * len(signature.outputs)
-        self._strides = ctypes.c_ssize_t * len(signature.inputs)
-        self._call = _function(library, f"{signature.symbol}_call", ctypes.c_void_p, ctypes.c_void_p)
-        self._batch = _function(library, f"{signature.symbol}_batch", ctypes.c_ssize_t, *[ctypes.c_void_p] * 3)
+        void, size = ctypes.c_void_p, ctypes.c_ssize_t
+        symbol = signature.symbol
+        self._signature = signature
+        self._idle: list[_Workspace] = []  # pop and append are atomic: no two calls ever share a workspace
+        self._call = _function(library, f"{symbol}_call", void, void)
+        self._batch = _function(library, f"{symbol}_batch", size, void, void, void)
         self._scan = (
-            _function(library, f"{signature.symbol}_scan", ctypes.c_ssize_t, ctypes.c_ssize_t, *[ctypes.c_void_p] * 3)
+            _function(library, f"{symbol}_scan", size, size, void, void, void)
             if is_step(signature.inputs, signature.outputs)
             else None
         )
 
     def call(self, inputs: Arrays, outputs: Arrays) -> None:
-        self._call(self._inputs(*[a.ctypes.data for a in inputs]), self._outputs(*[a.ctypes.data for a in outputs]))
+        try:
+            workspace = self._idle.pop()
+        except IndexError:
+            workspace = _Workspace(self._signature)
+        for buffer, array in zip(workspace.inputs, inputs, strict=True):
+            buffer[...] = array
+        self._call(workspace.input_pointers, workspace.output_pointers)
+        for buffer, array in zip(workspace.outputs, outputs, strict=True):
+            array[...] = buffer
+        self._idle.append(workspace)
 
     def batch(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
-        self._batch(
-            count,
-            self._inputs(*[a.ctypes.data for a in inputs]),
-            self._strides(*strides),
-            self._outputs(*[a.ctypes.data for a in outputs]),
-        )
+        self._batch(count, _pointers(inputs), _strides(strides), _pointers(outputs))
 
     def scan(
         self, count: int, every: int, inputs: Arrays, strides: Sequence[int], trajectory: np.ndarray[Any, Any]
     ) -> None:
         if self._scan is None:
             raise CacheError("the library has no loop for this kernel")
-        self._scan(
-            count,
-            every,
-            self._inputs(*[a.ctypes.data for a in inputs]),
-            self._strides(*strides),
-            trajectory.ctypes.data,
-        )
+        self._scan(count, every, _pointers(inputs), _strides(strides), trajectory.ctypes.data)
 
 
 class InterpretedBackend:
@@ -132,6 +142,14 @@ def _function(library: ctypes.CDLL, symbol: str, *types: Any) -> Any:
     function.argtypes = types
     function.restype = None
     return function
+
+
+def _pointers(arrays: Arrays) -> Any:
+    return (ctypes.c_void_p * len(arrays))(*[array.ctypes.data for array in arrays])
+
+
+def _strides(strides: Sequence[int]) -> Any:
+    return (ctypes.c_ssize_t * len(strides))(*strides)
 
 
 def _flat(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CodegenError
@@ -33,12 +32,10 @@ class Library:
         self.compiled = path is not None
         self.path = path
         self._functions = {function.name: function for function in functions}
+        self.__dict__.update(self._functions)
 
     def __getattr__(self, name: str) -> Compiled:
         functions = self.__dict__.get("_functions", {})
-        if name in functions:
-            found: Compiled = functions[name]
-            return found
         close = difflib.get_close_matches(name, functions, n=3) if not name.startswith("_") else []
         hint = f"; near: {', '.join(close)}" if close else f"; it has {', '.join(functions)}"
         raise AttributeError(f"the library {self.__dict__.get('namespace')} has no kernel {name!r}{hint}")
@@ -51,9 +48,6 @@ class Library:
 
     def __len__(self) -> int:
         return len(self.kernels)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self.kernels})
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
@@ -69,8 +63,3 @@ def check_names(signatures: Sequence[Signature]) -> None:
     for signature in signatures:
         if signature.name in Library.__annotations__ or hasattr(Library, signature.name):
             raise CodegenError(f"a kernel cannot be called {signature.name}: libraries have that attribute")
-
-
-def attribute_of(library: Library, name: str) -> Any:
-    """A kernel by name, for callers with a string."""
-    return library[name]
