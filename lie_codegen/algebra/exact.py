@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -16,7 +16,7 @@ from lie_codegen.algebra.expression import parse_number
 from lie_codegen.errors import InputError, NotFiniteError
 
 #: An exact number: what `exact_number` returns.
-Number = sp.Expr
+Number: TypeAlias = sp.Expr
 
 
 def exact_number(value: Any) -> Number:

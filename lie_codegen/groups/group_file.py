@@ -48,11 +48,16 @@ def group_from_table(table: Mapping[str, Any], where: str) -> MatrixGroup:
     _check_keys(table, where)
     name = _text(table, "name", where)
     labels = _texts(table, "labels", where)
-    options = {"units": _units(table, labels, where), "description": _text(table, "description", where, default="")}
+    units = _units(table, labels, where)
+    description = _text(table, "description", where, default="")
     try:
         if "matrices" in table:
-            return from_matrices(name, labels, _matrices(table["matrices"], labels, where), **options)
-        return from_brackets(name, labels, _brackets(table["brackets"], labels, where), **options)
+            return from_matrices(
+                name, labels, _matrices(table["matrices"], labels, where), units=units, description=description
+            )
+        return from_brackets(
+            name, labels, _brackets(table["brackets"], labels, where), units=units, description=description
+        )
     except GroupFileError:
         raise
     except InputError as error:

@@ -196,13 +196,13 @@ def _solver(group: MatrixGroup, controls: tuple[int, ...], intervals: int) -> An
     gaps = X - step.map(intervals)(before, a, b, h)
     miss = function_of(_miss_kernel(group))(goal, X[:, -1])
     energy = h / 3 * (ca.dot(a, a) + ca.dot(a, b) + ca.dot(b, b))
-    problem = {
+    problem: dict[str, Any] = {
         "x": ca.vertcat(ca.vec(U), ca.vec(X)),
         "p": goal,
         "f": energy,
         "g": ca.vertcat(ca.vec(gaps), miss),
     }
-    options = {
+    options: dict[str, Any] = {
         "expand": step.n_instructions() < _LARGE_STEP,
         "print_time": False,
         "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 300, "tol": 1e-10, "mu_init": 1e-3},

@@ -49,7 +49,7 @@ def make_task(
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
     """
     report = require_controllable(group.algebra, controls)
-    if isinstance(duration, str | bytes) or not np.isscalar(duration) or not np.isfinite(duration) or not duration > 0:
+    if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
         raise SteeringInputError(
             f"steer({group.name}): duration must be a positive number of seconds, got {duration!r}"
         )
