@@ -1,0 +1,157 @@
+"""The error functions of Bullo and Murray with compatible transport maps, and one for every matrix group.
+
+    so<n>_right   tr(K_p (1 - R_d^T R))/2, nu = Ad_{R^T R_d} xi_d                          section 5.3, (23)-(25)
+    so<n>_left    tr(K_p (1 - R R_d^T))/2, nu = xi_d
+    se<n>_1..6    the rows of Table 1 with K_1 (attitude) and K_2 (position); n = 2 or 3 and above
+    frobenius     k_p |X_d^-1 X - 1|^2/2 on any matrix group, nu = Ad_{X^-1 X_d} xi_d
+
+Row 5 is printed with (R + R_d)(p - p_d), which is not compatible with (1, 0); the pair phi_3(g g_d^-1) is
+(R + R_d)(R^T p - R_d^T p_d), and that is used.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
+from lie_codegen.control.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
+from lie_codegen.errors import InputError
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Gains = Mapping[str, Any]
+
+_ROWS = {
+    "1": "gains in the inertial frame; symmetric, not invariant",
+    "2": "gains in the reference frame; left-invariant, not symmetric",
+    "3": "gains in the body frame; left-invariant, not symmetric",
+    "4": "left-invariant and symmetric",
+    "5": "right-invariant and symmetric",
+    "6": "symmetric, not invariant",
+}
+
+
+def error_names(group: MatrixGroup) -> tuple[str, ...]:
+    """The names that `catalogue_error` knows for a group."""
+    names = ["frobenius"]
+    kind = _kind(group)
+    if kind == "so":
+        names = [f"so{group.degree}_right", f"so{group.degree}_left", *names]
+    if kind == "se":
+        names = [f"se{group.degree - 1}_{row}" for row in _ROWS] + names
+    return tuple(names)
+
+
+def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
+    """A pair by name.
+
+    Args:
+        group: SO(n), SE(n), or any group for "frobenius".
+        name: see the module.
+        gains: K_p for SO(n); K_1 and K_2 for SE(n); k_p for "frobenius". A number, a diagonal or a matrix.
+
+    Raises:
+        InputError: no such pair on this group, a gain is missing, or it is not positive as it must be.
+    """
+    known = error_names(group)
+    if name not in known:
+        close = difflib.get_close_matches(str(name), known, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise InputError(f"no error function {name!r} on {group.name}; known there: {', '.join(known)}{hint}")
+    if name == "frobenius":
+        return _frobenius(group, gains)
+    matched = re.fullmatch(r"(so|se)\d+_(\w+)", name)
+    variant = matched[2] if matched else ""
+    return _rotations(group, name, variant, gains) if variant in ("right", "left") else _motions(group, variant, gains)
+
+
+def gain(gains: Gains, name: str, where: str) -> Any:
+    """One gain; K_1, k_1, K1 and k1 are the same.
+
+    Raises:
+        InputError: it is missing.
+    """
+    wanted = _plain(name)
+    for key, value in gains.items():
+        if _plain(key) == wanted:
+            return value
+    raise InputError(f"{where} needs the gain {name}; given: {', '.join(gains) or 'none'}")
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", "").lower()
+
+
+def _kind(group: MatrixGroup) -> str:
+    """ "so" or "se" where the matrices are those of the usual representation, else ""."""
+    if group.is_complex:
+        return ""
+    d = group.degree
+    block = [m[:d, :d] for m in group.exact_basis]
+    if d >= 2 and group.dim == d * (d - 1) // 2 and all(m == -m.T for m in block):
+        return "so"
+    e = d - 1
+    rigid = all(m[:e, :e] == -m[:e, :e].T and not any(m[e, :]) for m in group.exact_basis)
+    return "se" if e >= 2 and group.dim == e * (e + 1) // 2 and rigid else ""
+
+
+def _frobenius(group: MatrixGroup, gains: Gains) -> ErrorFunction:
+    symbols = ErrorSymbols(group)
+    k = positive_number(gain(gains, "k_p", "the error function frobenius"), "k_p")
+    error = symbols.X_d_inverse * symbols.X - sp.eye(symbols.X.rows)
+    return ErrorFunction(
+        "frobenius", group, k * sp.Add(*[entry**2 for entry in error.flat()]) / 2, "right",
+        description="sum of squares of X_d^-1 X - 1; left-invariant",
+    )  # fmt: skip
+
+
+def _rotations(group: MatrixGroup, name: str, side: str, gains: Gains) -> ErrorFunction:
+    symbols = ErrorSymbols(group)
+    K = attitude_gain(gain(gains, "K_p", f"the error function {name}"), group.degree, "K_p")
+    R, R_d = symbols.X, symbols.X_d
+    relative = R_d.T * R if side == "right" else R * R_d.T
+    return ErrorFunction(name, group, _attitude(K, relative), side, constant=_least_pair(K))
+
+
+def _motions(group: MatrixGroup, row: str, gains: Gains) -> ErrorFunction:
+    symbols = ErrorSymbols(group)
+    e = group.degree - 1
+    name = f"se{e}_{row}"
+    K1 = attitude_gain(gain(gains, "K_1", f"the error function {name}"), e, "K_1")
+    K2 = positive_matrix(gain(gains, "K_2", f"the error function {name}"), e, "K_2")
+    R, p = symbols.X[:e, :e], symbols.X[:e, e]
+    S, q = symbols.X_d[:e, :e], symbols.X_d[:e, e]
+    offset: dict[str, Callable[[], sp.MatrixBase]] = {
+        "1": lambda: p - q,
+        "2": lambda: S.T * (p - q),
+        "3": lambda: R.T * (p - q),
+        "4": lambda: (R.T + S.T) * (p - q),
+        "5": lambda: (R + S) * (R.T * p - S.T * q),
+        "6": lambda: R.T * p - S.T * q,
+    }
+    relative = S.T * R if row in "1234" else R * S.T
+    x = offset[row]()
+    phi = _attitude(K1, relative) + (x.T * K2 * x)[0, 0] / 2
+    kind, tau = {"1": ("element", _element(R.T * S, 0 * p)), "5": ("left", None), "6": (
+        "element", _element(sp.eye(e), S.T * q - R.T * p))}.get(row, ("right", None))  # fmt: skip
+    return ErrorFunction(name, group, phi, kind, tau, None, _least_pair(K1), _ROWS[row])
+
+
+def _attitude(K: sp.MatrixBase, relative: sp.MatrixBase) -> sp.Expr:
+    """tr(K (1 - R_e))/2."""
+    return (K.trace() - (K * relative).trace()) / 2
+
+
+def _element(R: sp.MatrixBase, p: sp.MatrixBase) -> sp.ImmutableMatrix:
+    bottom = sp.Matrix([[0] * R.cols + [1]])
+    return sp.ImmutableMatrix(sp.Matrix.vstack(sp.Matrix.hstack(R, p), bottom))
+
+
+def _least_pair(K: sp.MatrixBase) -> float:
+    """min over i != j of k_i + k_j."""
+    values = eigenvalues(K)
+    return float(values[0] + values[1])

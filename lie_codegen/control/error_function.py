@@ -1,0 +1,201 @@
+"""Error functions and transport maps on any matrix group, as exact data.
+
+phi(X, X_d) measures the configuration error, and the transport map takes the reference velocity to nu = P(X, X_d)
+xi_d, so that xi_e = xi - nu is the velocity error. The pair must be compatible, d_2 phi + P^T d_1 phi = 0 (A2).
+Bullo and Murray, CIT-CDS 97-003, section 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.control.matrix_formula import matrix_formula, scalar_formula
+from lie_codegen.control.positive_matrix import real_number
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+#: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
+NAMED_TRANSPORTS = ("right", "left")
+
+
+@dataclass(frozen=True)
+class ErrorSymbols:
+    """The symbols in which phi, tau and P are written: entries of X, X_d and their inverses.
+
+    Real entries X11.., Xd11.., Xi11.. (inverse of X), Xdi11.. (inverse of X_d); for a complex group each splits into
+    X11re and X11im; above 9 rows X1_1. The matrices are real (see `RealMatrices`) for complex groups.
+    """
+
+    group: MatrixGroup
+
+    @property
+    def X(self) -> sp.ImmutableMatrix:
+        """The configuration."""
+        return self.matrix("X")
+
+    @property
+    def X_d(self) -> sp.ImmutableMatrix:
+        """The reference."""
+        return self.matrix("Xd")
+
+    @property
+    def X_inverse(self) -> sp.ImmutableMatrix:
+        """X^{-1}."""
+        return self.matrix("Xi")
+
+    @property
+    def X_d_inverse(self) -> sp.ImmutableMatrix:
+        """X_d^{-1}."""
+        return self.matrix("Xdi")
+
+    def matrix(self, prefix: str) -> sp.ImmutableMatrix:
+        """The real matrix of symbols of one of X, Xd, Xi, Xdi."""
+        d = self.group.degree
+        separator = "_" if d > 9 else ""
+
+        def entry(i: int, j: int, suffix: str = "") -> sp.Symbol:
+            return sp.Symbol(f"{prefix}{i + 1}{separator}{j + 1}{suffix}")
+
+        if not self.group.is_complex:
+            return sp.ImmutableMatrix(d, d, lambda i, j: entry(i, j))
+        re = sp.Matrix(d, d, lambda i, j: entry(i, j, "re"))
+        im = sp.Matrix(d, d, lambda i, j: entry(i, j, "im"))
+        return sp.ImmutableMatrix(sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re)))
+
+    @property
+    def matrices(self) -> dict[str, sp.ImmutableMatrix]:
+        """All four, by prefix."""
+        return {prefix: self.matrix(prefix) for prefix in ("X", "Xd", "Xi", "Xdi")}
+
+    @property
+    def names(self) -> dict[str, sp.Symbol]:
+        """Every symbol by its name, for the closed grammar."""
+        symbols = {s for m in self.matrices.values() for entry in m.flat() for s in entry.free_symbols}
+        return {symbol.name: symbol for symbol in symbols}
+
+
+@dataclass(frozen=True)
+class ErrorFunction:
+    """A pair (phi, transport map) on a group.
+
+    Attributes:
+        name: C identifier.
+        group: the group it lives on.
+        phi: the error function in the symbols of `ErrorSymbols`.
+        transport: "right" (nu = Ad_{X^-1 X_d} xi_d), "left" (nu = xi_d), "element" (nu = Ad_tau xi_d) or "matrix".
+        tau: (m, m) transport element, for "element".
+        P: (n, n) matrix nu = P xi_d, for "matrix".
+        constant: L such that phi is quadratic below it (A1), None when it is not known.
+        description: one line.
+    """
+
+    name: str
+    group: MatrixGroup
+    phi: sp.Expr
+    transport: str = "right"
+    tau: sp.ImmutableMatrix | None = None
+    P: sp.ImmutableMatrix | None = None
+    constant: float | None = None
+    description: str = field(default="", compare=False)
+
+
+def error_function(
+    group: MatrixGroup,
+    phi: Any,
+    transport: Any = "right",
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    constant: float | None = None,
+    name: str = "user",
+) -> ErrorFunction:
+    """A user's pair.
+
+    Args:
+        group: any matrix group.
+        phi: a SymPy expression in `ErrorSymbols`, or a text: entries as X11 and Xd12, or matrices as in
+            "tr(K*(1 - Xd^-1*X))/2" (names X, Xd, ^-1, ' for the transpose, tr, norm2 for the sum of squares).
+        transport: "right", "left", {"tau": matrix or text} for nu = Ad_tau xi_d, or {"P": n x n rows} for nu = P xi_d.
+        parameters: numbers and matrices by the names that the texts use.
+        constant: L of (A1) if you know it; then the region of attraction is reported.
+        name: C identifier.
+
+    Raises:
+        InputError: unknown transport, an unknown symbol; compatibility is checked by `check_compatibility`.
+        ExpressionError: a text outside the grammar, with the column.
+    """
+    symbols = ErrorSymbols(group)
+    values = _parameters(parameters or {}, symbols)
+    expression = _phi(phi, symbols, values)
+    tau, P, kind = _transport(transport, symbols, values)
+    return ErrorFunction(name, group, expression, kind, tau, P, constant)
+
+
+def _parameters(parameters: Mapping[str, Any], symbols: ErrorSymbols) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for key, value in parameters.items():
+        if key in symbols.names or key in symbols.matrices:
+            raise InputError(f"parameter {key!r} has the name of an entry of the configuration; rename it")
+        rows = value.tolist() if hasattr(value, "tolist") else value
+        if isinstance(rows, list | tuple):
+            table = rows if rows and isinstance(rows[0], list | tuple) else [[entry] for entry in rows]
+            values[key] = sp.ImmutableMatrix([[real_number(entry, key) for entry in row] for row in table])
+        else:
+            values[key] = real_number(rows, key)
+    return values
+
+
+def _phi(phi: Any, symbols: ErrorSymbols, values: Mapping[str, Any]) -> sp.Expr:
+    if isinstance(phi, str):
+        return scalar_formula(phi, symbols.matrices, symbols.names, values)
+    if not isinstance(phi, sp.Expr):
+        raise InputError(f"phi must be a text or a SymPy expression, got {type(phi).__name__}")
+    expression = phi.subs({sp.Symbol(key): value for key, value in values.items() if isinstance(value, sp.Expr)})
+    _check_symbols("phi", expression.free_symbols, symbols)
+    return expression
+
+
+def _transport(
+    transport: Any, symbols: ErrorSymbols, values: Mapping[str, Any]
+) -> tuple[sp.ImmutableMatrix | None, sp.ImmutableMatrix | None, str]:
+    if transport in NAMED_TRANSPORTS:
+        return None, None, str(transport)
+    if isinstance(transport, Mapping) and set(transport) == {"tau"}:
+        return _matrix("tau", transport["tau"], symbols, values, symbols.X.rows), None, "element"
+    if isinstance(transport, Mapping) and set(transport) == {"P"}:
+        return None, _matrix("P", transport["P"], symbols, values, symbols.group.dim), "matrix"
+    raise InputError(
+        f"transport {transport!r} is not known: give 'right' (Ad of X^-1 X_d), 'left' (the identity), "
+        "{'tau': a matrix of the group} or {'P': an n x n matrix}"
+    )
+
+
+def _matrix(what: str, rows: Any, symbols: ErrorSymbols, values: Mapping[str, Any], size: int) -> sp.ImmutableMatrix:
+    if isinstance(rows, str):
+        matrix = matrix_formula(rows, symbols.matrices, symbols.names, values)
+    elif isinstance(rows, sp.MatrixBase):
+        matrix = sp.ImmutableMatrix(rows)
+    else:
+        names = {**symbols.names, **{key: value for key, value in values.items() if isinstance(value, sp.Expr)}}
+        matrix = sp.ImmutableMatrix([[_entry(entry, names) for entry in row] for row in rows])
+    if matrix.shape != (size, size):
+        raise ShapeError(f"{what} is {matrix.rows} x {matrix.cols}; it must be {size} x {size}")
+    _check_symbols(what, matrix.free_symbols, symbols)
+    return matrix
+
+
+def _entry(entry: Any, names: Mapping[str, sp.Expr]) -> sp.Expr:
+    return parse_expression(entry, names, FORMULA_FUNCTIONS) if isinstance(entry, str) else sp.S(entry)
+
+
+def _check_symbols(what: str, used: Sequence[sp.Symbol] | set[sp.Symbol], symbols: ErrorSymbols) -> None:
+    unknown = sorted(str(symbol) for symbol in used if symbol.name not in symbols.names)
+    if unknown:
+        raise InputError(
+            f"{what} holds {', '.join(unknown)}, which is neither an entry of X or X_d nor a parameter; "
+            "entries are X11, Xd11, Xi11 (of the inverse of X) and Xdi11, and numbers go into parameters"
+        )

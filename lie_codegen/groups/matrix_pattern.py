@@ -1,0 +1,71 @@
+"""Complex groups as real ones, and the entries that are 0 or 1 in every element of a group."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import sympy as sp
+from sympy.utilities.iterables import strongly_connected_components
+
+from lie_codegen.algebra.constructions import _coordinate_map
+from lie_codegen.algebra.exact import Number
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+
+@dataclass(frozen=True)
+class RealMatrices:
+    """A matrix group as real m x m matrices; a complex X becomes [[Re X, -Im X], [Im X, Re X]].
+
+    Attributes:
+        group: the group, real or complex.
+    """
+
+    group: MatrixGroup
+
+    @cached_property
+    def basis(self) -> tuple[sp.ImmutableMatrix, ...]:
+        """(n) real m x m basis matrices."""
+        return tuple(sp.ImmutableMatrix(real_form(m, self.group.is_complex)) for m in self.group.exact_basis)
+
+    @property
+    def size(self) -> int:
+        """m: d for a real group, 2 d for a complex one."""
+        return self.group.degree * (2 if self.group.is_complex else 1)
+
+    @cached_property
+    def varying(self) -> frozenset[tuple[int, int]]:
+        """Entries (i, j) that are not those of the identity in every element: the closure of the basis' own pattern."""
+        reach = {(i, j) for m in self.basis for i in range(self.size) for j in range(self.size) if m[i, j] != 0}
+        while True:
+            longer = {(i, k) for (i, j) in reach for (other, k) in reach if j == other} | reach
+            if longer == reach:
+                return frozenset(reach)
+            reach = longer
+
+    @cached_property
+    def blocks(self) -> tuple[tuple[tuple[int, ...], bool], ...]:
+        """Diagonal blocks in the order in which X Y = B is solved, and whether each is orthogonal."""
+        edges = [(i, j) for (i, j) in self.varying if i != j]
+        parts = strongly_connected_components((list(range(self.size)), edges))
+        return tuple((tuple(sorted(part)), self._orthogonal(sorted(part))) for part in parts)
+
+    @cached_property
+    def coordinates(self) -> tuple[dict[tuple[int, int], Number], ...]:
+        """For each component the exact coefficients on matrix entries that read it off: x_k = sum c (i, j) A_ij."""
+        columns = [list(m.flat()) for m in self.basis]
+        pivots, inverse = _coordinate_map(self.group.name, self.group.labels, columns)
+        return tuple(
+            {divmod(p, self.size): value for p, value in zip(pivots, row, strict=True) if value != 0} for row in inverse
+        )
+
+    def _orthogonal(self, block: list[int]) -> bool:
+        return all(m[i, j] == -m[j, i] for m in self.basis for i in block for j in block)
+
+
+def real_form(matrix: sp.MatrixBase, is_complex: bool) -> sp.MatrixBase:
+    """[[Re, -Im], [Im, Re]] of a complex matrix; a real one as it is."""
+    if not is_complex:
+        return matrix
+    re, im = matrix.applyfunc(sp.re), matrix.applyfunc(sp.im)
+    return sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re))
