@@ -19,9 +19,10 @@ import numpy as np
 import pytest
 import toy_kernels
 
-from lie_codegen.errors import CacheWarning, CodegenError, CompileError, NoCompilerWarning
+from lie_codegen.errors import CacheError, CacheWarning, CodegenError, CompileError, NoCompilerWarning
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.runtime import build, cache, cache_folder, compiler
+from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache import cache_info, clear_cache
 from lie_codegen.runtime.compiler import FLAGS, find_compilers, flags_for
@@ -55,6 +56,13 @@ def compiles(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(build, "compile_library", counted)
     return runs
+
+
+def load_copy(path: Path) -> Any:
+    """Load what is on disk now, whatever this process has open under that name."""
+    if not path.is_file():
+        raise CacheError(f"{path} is gone")
+    return load_library(path)
 
 
 def run_python(code: str, **variables: str) -> str:
@@ -93,6 +101,7 @@ WARM = """
 import sys
 import warnings
 warnings.simplefilter("error")
+from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 def make():
     import toy_kernels
@@ -216,6 +225,36 @@ def test_a_full_disk_falls_back_to_a_temporary_folder(home: Path, monkeypatch: p
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # said once
         assert build_kernels(lambda: [scaled(5)], definition="five").scale(2.0) == 10.0
+
+
+def test_a_cache_that_cannot_be_written_is_still_read(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    build_kernels(lambda: [scaled(5)], definition="five")
+
+    def refused(*args: Any) -> Any:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(cache, "write_json", refused)
+    monkeypatch.setattr(cache.os, "utime", refused)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert build_kernels(never, definition="five").scale(2.0) == 10.0
+
+
+def test_a_library_that_goes_between_check_and_load_is_built_again(
+    compiles: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build_kernels(lambda: [scaled(5)], definition="five")
+    real = cache.find_request
+
+    def evicted(folder: Path, request: str) -> Any:
+        entry = real(folder, request)
+        shutil.rmtree(folder / "entries", ignore_errors=True)
+        return entry
+
+    monkeypatch.setattr(cache, "find_request", evicted)
+    monkeypatch.setattr(build, "load_library", load_copy)
+    assert build_kernels(lambda: [scaled(5)], definition="five").scale(2.0) == 10.0
+    assert len(compiles) == 2
 
 
 def test_a_cache_that_cannot_be_made_falls_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

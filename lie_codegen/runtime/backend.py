@@ -134,7 +134,9 @@ def load_library(path: Path) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
-        raise CacheError(f"the compiled library {path} cannot be loaded: {error}") from error
+        raise CacheError(
+            f"the compiled library cannot be loaded: {error}; set LIE_CODEGEN_CACHE to a folder from which code may run"
+        ) from error
 
 
 def _function(library: ctypes.CDLL, symbol: str, *types: Any) -> Any:

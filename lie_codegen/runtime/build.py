@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import CodegenError, CompileError
+from lie_codegen.errors import CacheError, CodegenError, CompileError
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.backend import CtypesBackend, InterpretedBackend, load_library
@@ -62,8 +62,8 @@ def build_kernels(
         requests = [_request(namespace, definition, options or {}, compiler) for compiler in compilers]
         for request in requests:
             entry = cache.find_request(folder, request)
-            if entry is not None:
-                return _open(entry)
+            if entry is not None and (library := _open_or_none(entry)) is not None:
+                return library
     kernels = tuple(make_kernels())
     try:
         return _compile(folder, namespace, kernels, compilers, requests)
@@ -161,6 +161,14 @@ def _fill(
         output = f"{namespace}{_SUFFIX}"
         compile_library(compiler, home, sources.main, output, flags)
         return cache.store_entry(folder, key, home / output, namespace, sources.signatures)
+
+
+def _open_or_none(entry: cache.Entry) -> Library | None:
+    """None where another process evicted the entry meanwhile."""
+    try:
+        return _open(entry)
+    except CacheError:
+        return None
 
 
 def _open(entry: cache.Entry) -> Library:
