@@ -24,7 +24,7 @@ from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.runtime import build, cache, cache_folder, compiler
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
-from lie_codegen.runtime.cache import cache_info, clear_cache
+from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
 from lie_codegen.runtime.compiler import FLAGS, find_compilers, flags_for
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -204,7 +204,7 @@ def test_a_build_killed_half_way_leaves_nothing_in_the_way(home: Path, tmp_path:
     run_python(code + "; print('built')", LIE_CODEGEN_CC=str(slow))
     assert len(list(home.glob("entries/*/entry.json"))) == 1
     os.utime(left, (0, 0))
-    cache.evict(home, keep="")
+    evict(home, keep="")
     assert not left.exists()
 
 

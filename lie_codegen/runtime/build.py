@@ -16,6 +16,7 @@ from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.backend import CtypesBackend, InterpretedBackend, load_library
 from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
+from lie_codegen.runtime.cache_upkeep import evict
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.compiler import (
     Compiler,
@@ -147,7 +148,7 @@ def _compile(
             failure = failure or error
             continue
         library = _open(entry)
-        cache.evict(folder, keep=key)
+        evict(folder, keep=key)
         return library
     raise failure or CompileError("no compiler to try")
 

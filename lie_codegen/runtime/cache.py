@@ -17,18 +17,15 @@ import os
 import re
 import shutil
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 
-_DEFAULT_LIMIT = 1 << 30
-_DIGEST = re.compile(r"[0-9a-f]{64}")
-_STALE_SECONDS = 86_400.0
+#: The form of every key.
+DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -40,63 +37,11 @@ class Entry:
     signatures: tuple[Signature, ...]
 
 
-@dataclass(frozen=True)
-class CacheInfo:
-    """What `lie-codegen cache` shows.
-
-    Attributes:
-        folder: where the cache is.
-        problem: why it cannot be used, or None.
-        entries, bytes: number of libraries, and their size.
-        limit: bytes above which the least recently used go; LIE_CODEGEN_CACHE_LIMIT overrides.
-    """
-
-    folder: Path
-    problem: str | None
-    entries: int
-    bytes: int
-    limit: int
-
-
-def cache_info() -> CacheInfo:
-    """The state of the cache."""
-    folder = cache_folder()
-    problem = why_unusable(folder) if folder.exists() else None
-    entries = _entries(folder)
-    return CacheInfo(folder, problem, len(entries), sum(_size(entry) for entry in entries), limit())
-
-
-def clear_cache() -> int:
-    """Remove every library and request, and nothing else; return the number of libraries removed."""
-    folder = cache_folder()
-    entries = _entries(folder)
-    for entry in entries:
-        _remove_entry(entry)
-    for pattern in ("requests/*.json", "locks/*.lock"):
-        for file in folder.glob(pattern):
-            if _DIGEST.fullmatch(file.stem):
-                _unlink(file)
-    for scratch in folder.glob("scratch/build-*"):
-        _remove_scratch(scratch)
-    for name in ("entries", "requests", "locks", "scratch"):
-        with contextlib.suppress(OSError):
-            (folder / name).rmdir()
-    return len(entries)
-
-
-def limit() -> int:
-    """Size of the cache in bytes: LIE_CODEGEN_CACHE_LIMIT, else 1 GiB."""
-    try:
-        return max(0, int(os.environ.get("LIE_CODEGEN_CACHE_LIMIT", "")))
-    except ValueError:
-        return _DEFAULT_LIMIT
-
-
 def find_request(folder: Path, request: str) -> Entry | None:
     """The library that answered an equal request before, verified; None if there is none."""
     data = _read_json(folder / "requests" / f"{request}.json")
     key = data.get("entry") if isinstance(data, dict) else None
-    return find_entry(folder, key) if isinstance(key, str) and _DIGEST.fullmatch(key) else None
+    return find_entry(folder, key) if isinstance(key, str) and DIGEST.fullmatch(key) else None
 
 
 def find_entry(folder: Path, key: str) -> Entry | None:
@@ -174,23 +119,7 @@ def scratch(folder: Path) -> Iterator[Path]:
     try:
         yield home
     finally:
-        _remove_scratch(home)
-
-
-def evict(folder: Path, keep: str) -> None:
-    """Remove what a killed build left, and the least recently used libraries above the limit."""
-    for left in folder.glob("scratch/build-*"):
-        with contextlib.suppress(OSError):
-            if time.time() - left.stat().st_mtime > _STALE_SECONDS:
-                _remove_scratch(left)
-    entries = sorted(_entries(folder), key=_last_use)
-    total = sum(_size(entry) for entry in entries)
-    for entry in entries:
-        if total <= limit():
-            break
-        if entry.name != keep:
-            total -= _size(entry)
-            _remove_entry(entry)
+        remove_scratch(home)
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -206,7 +135,7 @@ def write_json(path: Path, data: Any) -> None:
             json.dump(data, file)
         os.replace(name, path)
     except OSError:
-        _unlink(Path(name))
+        unlink(Path(name))
         raise
 
 
@@ -221,37 +150,12 @@ def _file_digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _entries(folder: Path) -> list[Path]:
-    return [path for path in folder.glob("entries/*") if _DIGEST.fullmatch(path.name) and path.is_dir()]
+def remove_scratch(home: Path) -> None:
+    """Remove a folder of `scratch`, whatever a compiler left in it."""
+    shutil.rmtree(home, ignore_errors=True)
 
 
-def _last_use(entry: Path) -> float:
-    try:
-        return (entry / "entry.json").stat().st_mtime
-    except OSError:
-        return 0.0
-
-
-def _size(entry: Path) -> int:
-    total = 0
-    for file in entry.glob("*"):
-        with contextlib.suppress(OSError):
-            total += file.stat().st_size
-    return total
-
-
-def _remove_entry(entry: Path) -> None:
-    _unlink(entry / "entry.json")  # first: without it the rest is never loaded
-    for file in (*entry.glob("*-????????????????????????????????.*"), *entry.glob(".new-*")):
-        _unlink(file)
-    with contextlib.suppress(OSError):
-        entry.rmdir()
-
-
-def _remove_scratch(home: Path) -> None:
-    shutil.rmtree(home, ignore_errors=True)  # made by mkdtemp in our own folder; compilers may leave folders in it
-
-
-def _unlink(file: Path) -> None:
+def unlink(file: Path) -> None:
+    """Remove a file if it is there and may be removed."""
     with contextlib.suppress(OSError):
         file.unlink()
