@@ -2,8 +2,8 @@
 
 For each coordinate g_k and each class of commensurable frequencies there is one pair of generators c = cos(b g_k) and
 s = sin(b g_k), b the largest frequency of which all are multiples; for rates likewise one pair e^{a g_k}, e^{-a g_k}.
-Monomials are reduced by s^2 = 1 - c^2 and e^{a g} e^{-a g} = 1, which makes the form of every element unique: equality is
-comparison, and no trigonometric simplification is ever needed. Fractions are cancelled by polynomial gcd.
+Monomials are reduced by s^2 = 1 - c^2 and e^{a g} e^{-a g} = 1, which makes the form of every element unique: equality
+is comparison, and no trigonometric simplification is ever needed. Fractions are cancelled by polynomial gcd.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from math import comb
 from typing import Any
 
 import sympy as sp
+from sympy.polys.domains import QQ
 from sympy.polys.rings import PolyElement, ring
 
 from lie_codegen.algebra.exact import Number, field_elements
@@ -21,6 +22,9 @@ from lie_codegen.errors import ComputationError
 
 #: An element of the ring in reduced form.
 Element = Any
+_Factor = tuple[Element, list[sp.Expr], int]
+#: Terms above which polynomials over an irrational field are not factored.
+_LONG = 40
 
 
 class TrigonometricRing:
@@ -127,12 +131,14 @@ class TrigonometricRing:
 
     def expression(self, element: Element) -> sp.Expr:
         """The element as a SymPy expression."""
-        element = self.ring(element)
-        return sp.Add(*(self._term(monomial, coefficient) for monomial, coefficient in element.terms()))
+        return self._shown_as(self.ring(element), self._shown)
 
-    def _term(self, monomial: tuple[int, ...], coefficient: Any) -> sp.Expr:
-        powers = (shown**power for shown, power in zip(self._shown, monomial, strict=True) if power)
-        return sp.Mul(self.domain.to_sympy(coefficient), *powers)
+    def _shown_as(self, element: Element, shown: list[sp.Expr]) -> sp.Expr:
+        terms = []
+        for monomial, coefficient in element.terms():
+            powers = (name**power for name, power in zip(shown, monomial, strict=True) if power)
+            terms.append(sp.Mul(self.domain.to_sympy(coefficient), *powers))
+        return sp.Add(*terms)
 
     def fraction(self, numerator: Element, denominator: Element) -> tuple[Element, Element]:
         """Numerator and denominator in lowest terms; powers of exponentials end in the numerator."""
@@ -156,7 +162,7 @@ class TrigonometricRing:
             if power:
                 decay = self._generators[minus] ** power
                 numerator, denominator = self.reduce(numerator * decay), self.reduce(denominator * decay)
-        if len(denominator) == 1 or denominator.LC < 0:
+        if len(denominator) == 1 or self.domain.is_negative(denominator.LC):
             unit = denominator.LC
             numerator, denominator = numerator.mul_ground(1 / unit), denominator.mul_ground(1 / unit)
         return numerator, denominator
@@ -175,26 +181,101 @@ class TrigonometricRing:
         return self.expression(numerator) * tangents / self.factored(denominator)
 
     def factors(self, element: Element) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
-        """(unit, [(factor, multiplicity)]): the unit is a number times exponentials."""
-        [cleared] = self._without_decay(self.ring(element))
+        """(unit, [(factor, multiplicity)]): the unit is a number times exponentials and never vanishes."""
+        element = self.ring(element)
+        [cleared] = self._without_decay(element)
         unit = sp.S.One
-        for plus, minus in self._pairs:
-            power = max((monomial[minus] for monomial in element), default=0)
-            unit *= self._shown[minus] ** power
-        constant, found = cleared.factor_list()
-        unit *= self.domain.to_sympy(constant)
+        for _, minus in self._pairs:
+            unit *= self._shown[minus] ** max((monomial[minus] for monomial in element), default=0)
+        constant, found = self._factor_list(cleared, self._shown)
+        unit *= constant
         proper: list[tuple[sp.Expr, int]] = []
-        for factor, multiplicity in found:
+        for factor, shown, multiplicity in found:
+            hyperbolic = self._hyperbolic(factor)
             if len(factor) == 1 and self._is_exponential(factor):
                 unit *= self.expression(factor) ** multiplicity
+            elif hyperbolic is not None:
+                growth, function = hyperbolic
+                unit *= (2 * growth) ** multiplicity
+                proper.append((function, multiplicity))
             else:
-                proper.append((self.expression(factor), multiplicity))
+                proper.append((self._shown_as(factor, shown), multiplicity))
         return unit, proper
+
+    def _factor_list(self, element: Element, shown: list[sp.Expr]) -> tuple[sp.Expr, list[_Factor]]:
+        """(constant, [(factor, what its generators stand for, multiplicity)]), in double angles where that splits more.
+
+        Over Q where the coefficients allow it up to a constant; factoring over Q(sqrt 3) is far slower and is left out
+        for long polynomials.
+        """
+        if not element:
+            return sp.S.Zero, []
+        leading = element.LC
+        monic = element.mul_ground(self.domain.one / leading)
+        if self.domain.is_Algebraic:
+            if all(self.domain.to_sympy(value).is_Rational for value in monic.values()):
+                rational = monic.set_ring(self.ring.clone(domain=QQ))
+                constant, found = rational.factor_list()
+                found = [(factor.set_ring(self.ring), multiplicity) for factor, multiplicity in found]
+                constant = sp.Rational(constant.numerator, constant.denominator)
+            elif len(monic) > _LONG:
+                constant, found = sp.S.One, [(monic, 1)]
+            else:
+                constant, found = monic.factor_list()
+                constant = self.domain.to_sympy(constant)
+        else:
+            constant, found = monic.factor_list()
+            constant = self.domain.to_sympy(constant)
+        constant *= self.domain.to_sympy(leading)
+        result: list[_Factor] = []
+        for factor, multiplicity in found:
+            doubled = self._doubled(factor, shown) if len(factor) > 1 else None
+            if doubled is None:
+                result.append((factor, shown, multiplicity))
+                continue
+            inner, parts = self._factor_list(*doubled)
+            constant *= inner**multiplicity
+            result += [(part, names, power * multiplicity) for part, names, power in parts]
+        return constant, result
+
+    def _doubled(self, element: Element, shown: list[sp.Expr]) -> tuple[Element, list[sp.Expr]] | None:
+        """The element over cos 2x and sin 2x for every x in which it is even: c^2 = (1 + C) / 2, s c = S / 2."""
+        names = list(shown)
+        half = self.domain.one / self.domain.from_sympy(sp.Integer(2))
+        for position in self._cosine.values():
+            degrees = [monomial[position] + monomial[position + 1] for monomial in element]
+            if not any(degrees) or any(degree % 2 for degree in degrees):
+                continue
+            cosine, sine = self._generators[position : position + 2]
+            total = self.ring.zero
+            for monomial, coefficient in element.terms():
+                c, s = monomial[position : position + 2]
+                rest = self.ring.from_dict({(*monomial[:position], 0, 0, *monomial[position + 2 :]): coefficient})
+                rest = rest * (half * (1 + cosine)) ** ((c - s) // 2)
+                total = total + (rest * half * sine if s else rest)
+            element = total
+            angle = 2 * names[position].args[0]
+            names[position], names[position + 1] = sp.cos(angle), sp.sin(angle)
+        return None if names == shown else (element, names)
 
     def factored(self, element: Element) -> sp.Expr:
         """The element as a product of its factors."""
         unit, proper = self.factors(element)
         return unit * sp.Mul(*(factor**multiplicity for factor, multiplicity in proper))
+
+    def _hyperbolic(self, factor: Element) -> tuple[sp.Expr, sp.Expr] | None:
+        """e^{2x} + 1 = 2 e^x cosh x and e^{2x} - 1 = 2 e^x sinh x as (e^x, cosh x or sinh x)."""
+        if len(factor) != 2:
+            return None
+        (top, one), (rest, sign) = factor.terms()
+        domain = self.domain
+        if any(rest) or one != domain.one or sign not in (domain.one, -domain.one):
+            return None
+        powers = [position for position, power in enumerate(top) if power]
+        if len(powers) != 1 or powers[0] not in {plus for plus, _ in self._pairs}:
+            return None
+        exponent = self._shown[powers[0]].args[0] * sp.Rational(top[powers[0]], 2)
+        return sp.exp(exponent), sp.cosh(exponent) if sign == domain.one else sp.sinh(exponent)
 
     def _is_exponential(self, factor: Element) -> bool:
         [monomial] = list(factor)

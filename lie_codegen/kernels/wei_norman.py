@@ -2,22 +2,26 @@
 
     X = exp(g_1 A_1) ... exp(g_n A_n),  X' = X hat(u),  g' = M(g) u.
 
-Column j of M^{-1} is exp(-g_n ad_n) ... exp(-g_{j+1} ad_{j+1}) e_j. Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and
-Krishnaprasad, TR 93-59, (12)-(15). Code is generated from `wei_norman_body`, not from these expressions.
+Column j of M^{-1} is exp(-g_n ad_n) ... exp(-g_{j+1} ad_{j+1}) e_j. Wei and Norman, Proc. AMS 15 (1964) 327; Leonard
+and Krishnaprasad, TR 93-59, (12)-(15). Code is generated from `wei_norman_body`, not from these expressions.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import sympy as sp
 
+from lie_codegen.algebra.adjoint import ad
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernels.block_solve import blocks_of
+from lie_codegen.kernels.arithmetic import Arithmetic
+from lie_codegen.kernels.block_solve import SparseMatrix, blocks_of
+from lie_codegen.kernels.exponential_entries import ExponentialEntries
 from lie_codegen.kernels.ring_solve import adjugate, determinant
 from lie_codegen.kernels.trigonometric_ring import Element, TrigonometricRing
-from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns
+from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, times_vector
 
 
 @dataclass(frozen=True)
@@ -51,10 +55,12 @@ class WeiNorman:
     @cached_property
     def determinant_factors(self) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
         """(unit, ((factor, multiplicity), ...)): the unit, a number times exponentials, never vanishes."""
-        unit = sp.S.One
+        ring = self._ring
         powers: dict[sp.Expr, int] = {}
-        for block in self._blocks:
-            block_unit, factors = self._ring.factors(determinant(self._ring, self._dense(block, block)))
+        columns, unit = _balanced_columns(ring, self.data)
+        for block in blocks_of(columns, self.group.dim):
+            dense = [[columns.get((i, j), ring.ring.zero) for j in block] for i in block]
+            block_unit, factors = ring.factors(determinant(ring, dense))
             unit *= block_unit
             for factor, multiplicity in factors:
                 powers[factor] = powers.get(factor, 0) + multiplicity
@@ -96,7 +102,8 @@ class WeiNorman:
     @cached_property
     def _columns(self) -> dict[tuple[int, int], Element]:
         ring = self._ring
-        columns = inverse_columns(ring, self.data, ring.coordinates, printed=True)
+        # The printed form asks an arithmetic for constants, sin, cos and exp alone, and those a ring has.
+        columns = inverse_columns(cast(Arithmetic, ring), self.data, ring.coordinates, printed=True)
         return {place: ring.ring(value) for place, value in columns.items() if value != 0}
 
     @cached_property
@@ -106,6 +113,32 @@ class WeiNorman:
     def _dense(self, rows: list[int], columns: list[int]) -> list[list[Element]]:
         zero = self._ring.ring.zero
         return [[self._columns.get((i, j), zero) for j in columns] for i in rows]
+
+
+def _balanced_columns(ring: TrigonometricRing, data: WeiNormanData) -> tuple[SparseMatrix, sp.Expr]:
+    """N and a unit with det M^{-1} = unit * det N, N with shorter products of exponentials than M^{-1}.
+
+    M^{-1} = exp(-g_n ad_n) ... exp(-g_m ad_m) N with m near n / 2; the determinant of the exponentials is that of the
+    exponentials of traces. Column j of N is exp(-g_{m-1} ad_{m-1}) ... exp(-g_{j+1} ad_{j+1}) e_j below m, and
+    exp(g_m ad_m) ... exp(g_{j-1} ad_{j-1}) e_j from m on.
+    """
+    n = data.group.dim
+    middle = (n + 1) // 2
+    ops = cast(Arithmetic, ring)
+    factors = {
+        k: ExponentialEntries(
+            ops, ring.coordinates[k] * (-1 if k < middle else 1), data.adjoint[k], printed=True
+        ).sparse()
+        for k in range(n)
+    }
+    columns: dict[tuple[int, int], Element] = {}
+    for j in range(n):
+        column: dict[int, Element] = {j: ring.ring.one}
+        for k in range(j + 1, middle) if j < middle else reversed(range(middle, j)):
+            column = times_vector(factors[k], column)
+        columns.update({(i, j): value for i, value in column.items() if value})
+    traces = (ad(data.group.algebra, k).trace() * ring.symbols[k] for k in range(middle, n))
+    return columns, sp.Mul(*(sp.exp(-trace) for trace in traces))
 
 
 def _combination(

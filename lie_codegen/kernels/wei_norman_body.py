@@ -62,12 +62,13 @@ def inverse_columns(
         for k in range(j + 1, n):
             if k not in exponentials:
                 exponentials[k] = ExponentialEntries(ops, -g[k], data.adjoint[k], printed=printed).sparse()
-            column = _times_vector(exponentials[k], column)
+            column = times_vector(exponentials[k], column)
         matrix.update({(i, j): value for i, value in column.items()})
     return matrix
 
 
-def _times_vector(matrix: Mapping[tuple[int, int], Scalar], vector: Mapping[int, Scalar]) -> dict[int, Scalar]:
+def times_vector(matrix: Mapping[tuple[int, int], Scalar], vector: Mapping[int, Scalar]) -> dict[int, Scalar]:
+    """The sparse product of a matrix and a vector."""
     result: dict[int, Scalar] = {}
     for (i, j), entry in matrix.items():
         if j in vector:
@@ -82,9 +83,7 @@ def rate(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], u: Sequence[
     return [solution.get(i, 0) for i in range(n)]
 
 
-def matrix(
-    ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], *, printed: bool = False
-) -> list[list[Scalar]]:
+def matrix(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], *, printed: bool = False) -> list[list[Scalar]]:
     """M(g), row by row."""
     n = data.group.dim
     columns = solve(ops, inverse_columns(ops, data, g, printed=printed), [{j: 1} for j in range(n)], n)
