@@ -53,7 +53,7 @@ def cache(
     clear: Annotated[bool, typer.Option("--clear", help="Remove every entry of ours.")] = False, json: Json = False
 ) -> None:
     """Show the cache of compiled libraries, or clear it."""
-    from lie_codegen.runtime.cache import cache_info, clear_cache
+    from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache
 
     removed = clear_cache() if clear else 0
     info = cache_info()
