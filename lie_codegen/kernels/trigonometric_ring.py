@@ -143,8 +143,20 @@ class TrigonometricRing:
     def fraction(self, numerator: Element, denominator: Element) -> tuple[Element, Element]:
         """Numerator and denominator in lowest terms; powers of exponentials end in the numerator."""
         numerator, denominator = self._without_decay(self.ring(numerator), self.ring(denominator))
-        numerator, denominator = numerator.cancel(denominator)
+        if not self.domain.is_Algebraic:
+            numerator, denominator = numerator.cancel(denominator)
+        elif numerator:
+            # A gcd over Q(sqrt 3) takes minutes; common monomials and an exact quotient are found at once.
+            common = self.ring.from_dict({self._common(numerator, denominator): self.domain.one})
+            numerator, denominator = numerator.quo(common), denominator.quo(common)
+            quotient, rest = numerator.div(denominator)
+            numerator, denominator = (numerator, denominator) if rest else (quotient, self.ring.one)
         return self._units_above(numerator, denominator)
+
+    @staticmethod
+    def _common(*elements: Element) -> tuple[int, ...]:
+        """The largest monomial that divides all elements."""
+        return tuple(map(min, zip(*(monomial for element in elements for monomial in element), strict=True)))
 
     def _without_decay(self, *elements: Element) -> list[Element]:
         """The elements times a common power of each e^{a g}, such that no e^{-a g} is left."""

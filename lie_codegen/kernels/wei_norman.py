@@ -19,7 +19,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic
 from lie_codegen.kernels.block_solve import SparseMatrix, blocks_of
 from lie_codegen.kernels.exponential_entries import ExponentialEntries
-from lie_codegen.kernels.ring_solve import adjugate, determinant
+from lie_codegen.kernels.ring_solve import combination, dense, determinant, inverse_rows
 from lie_codegen.kernels.trigonometric_ring import Element, TrigonometricRing
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, times_vector
 
@@ -55,12 +55,12 @@ class WeiNorman:
     @cached_property
     def determinant_factors(self) -> tuple[sp.Expr, tuple[tuple[sp.Expr, int], ...]]:
         """(unit, ((factor, multiplicity), ...)): the unit, a number times exponentials, never vanishes."""
-        ring = self._ring
+        ring, n = self._ring, self.group.dim
         powers: dict[sp.Expr, int] = {}
-        columns, unit = _balanced_columns(ring, self.data)
-        for block in blocks_of(columns, self.group.dim):
-            dense = [[columns.get((i, j), ring.ring.zero) for j in block] for i in block]
-            block_unit, factors = ring.factors(determinant(ring, dense))
+        traces = (ad(self.group.algebra, k).trace() * self.g[k] for k in range(self._middle, n))
+        unit = sp.Mul(*(sp.exp(-trace) for trace in traces))
+        for block in blocks_of(self._frame, n):
+            block_unit, factors = ring.factors(determinant(ring, dense(ring, self._frame, block, block)))
             unit *= block_unit
             for factor, multiplicity in factors:
                 powers[factor] = powers.get(factor, 0) + multiplicity
@@ -68,32 +68,15 @@ class WeiNorman:
 
     @cached_property
     def M(self) -> sp.ImmutableMatrix:
-        """(n, n) exact M(g), block by block over the block-triangular form of M^{-1}."""
+        """(n, n) exact M(g) = N^{-1} R, entries in lowest terms (common monomials alone over irrational fields)."""
         ring, n = self._ring, self.group.dim
-        rows: list[list[tuple[Element, Element]]] = [[(ring.ring.zero, ring.ring.one)] * n for _ in range(n)]
-        solved: list[int] = []
-        for block in self._blocks:
-            dense = self._dense(block, block)
-            cofactors, det = adjugate(ring, dense), determinant(ring, dense)
-            coupling = self._dense(block, solved)
-            for column in range(n):
-                residual = [
-                    self._residual(i, row, column, solved, rows) for i, row in zip(block, coupling, strict=True)
-                ]
-                for i, row in zip(block, cofactors, strict=True):
-                    numerator, denominator = _combination(ring, row, residual)
-                    rows[i][column] = ring.fraction(numerator, ring.reduce(denominator * det))
-            solved += block
-        return sp.ImmutableMatrix(n, n, lambda i, j: ring.quotient(*rows[i][j]))
-
-    def _residual(
-        self, i: int, row: list[Element], column: int, solved: list[int], rows: list[list[tuple[Element, Element]]]
-    ) -> tuple[Element, Element]:
-        """Entry i of e_column - (what the solved coordinates contribute)."""
-        ring = self._ring
-        numerator, denominator = _combination(ring, row, [rows[j][column] for j in solved])
-        one = denominator if i == column else ring.ring.zero
-        return one - numerator, denominator
+        inverse = inverse_rows(ring, self._frame, n)
+        entries = []
+        for i in range(n):
+            for j in range(n):
+                column = [self._rotation.get((k, j), ring.ring.zero) for k in range(n)]
+                entries.append(ring.quotient(*combination(ring, column, inverse[i])))
+        return sp.ImmutableMatrix(n, n, entries)
 
     @cached_property
     def _ring(self) -> TrigonometricRing:
@@ -106,58 +89,48 @@ class WeiNorman:
         columns = inverse_columns(cast(Arithmetic, ring), self.data, ring.coordinates, printed=True)
         return {place: ring.ring(value) for place, value in columns.items() if value != 0}
 
+    @property
+    def _middle(self) -> int:
+        """m in M^{-1} = exp(-g_n ad_n) ... exp(-g_m ad_m) N, counted from 0: the products in N are half as long."""
+        return (self.group.dim + 1) // 2
+
     @cached_property
-    def _blocks(self) -> list[list[int]]:
-        return blocks_of(self._columns, self.group.dim)
+    def _frame(self) -> SparseMatrix:
+        """N: column j is exp(-g_{m-1} ad_{m-1}) ... exp(-g_{j+1} ad_{j+1}) e_j below m,
+        and exp(g_m ad_m) ... exp(g_{j-1} ad_{j-1}) e_j from m on."""
+        backward, forward = self._factors(-1, 0, self._middle), self._factors(1, self._middle, self.group.dim)
+        frame: dict[tuple[int, int], Element] = {}
+        for j in range(self.group.dim):
+            column: dict[int, Element] = {j: self._ring.ring.one}
+            if j < self._middle:
+                for k in range(j + 1, self._middle):
+                    column = times_vector(backward[k], column)
+            else:
+                for k in reversed(range(self._middle, j)):
+                    column = times_vector(forward[k], column)
+            frame.update({(i, j): value for i, value in column.items() if value})
+        return frame
 
-    def _dense(self, rows: list[int], columns: list[int]) -> list[list[Element]]:
-        zero = self._ring.ring.zero
-        return [[self._columns.get((i, j), zero) for j in columns] for i in rows]
+    @cached_property
+    def _rotation(self) -> SparseMatrix:
+        """R = exp(g_m ad_m) ... exp(g_n ad_n), with N M = R."""
+        forward = self._factors(1, self._middle, self.group.dim)
+        matrix: dict[tuple[int, int], Element] = {}
+        for j in range(self.group.dim):
+            column: dict[int, Element] = {j: self._ring.ring.one}
+            for k in reversed(range(self._middle, self.group.dim)):
+                column = times_vector(forward[k], column)
+            matrix.update({(i, j): self._ring.reduce(value) for i, value in column.items() if value})
+        return matrix
 
-
-def _balanced_columns(ring: TrigonometricRing, data: WeiNormanData) -> tuple[SparseMatrix, sp.Expr]:
-    """N and a unit with det M^{-1} = unit * det N, N with shorter products of exponentials than M^{-1}.
-
-    M^{-1} = exp(-g_n ad_n) ... exp(-g_m ad_m) N with m near n / 2; the determinant of the exponentials is that of the
-    exponentials of traces. Column j of N is exp(-g_{m-1} ad_{m-1}) ... exp(-g_{j+1} ad_{j+1}) e_j below m, and
-    exp(g_m ad_m) ... exp(g_{j-1} ad_{j-1}) e_j from m on.
-    """
-    n = data.group.dim
-    middle = (n + 1) // 2
-    ops = cast(Arithmetic, ring)
-    factors = {
-        k: ExponentialEntries(
-            ops, ring.coordinates[k] * (-1 if k < middle else 1), data.adjoint[k], printed=True
-        ).sparse()
-        for k in range(n)
-    }
-    columns: dict[tuple[int, int], Element] = {}
-    for j in range(n):
-        column: dict[int, Element] = {j: ring.ring.one}
-        for k in range(j + 1, middle) if j < middle else reversed(range(middle, j)):
-            column = times_vector(factors[k], column)
-        columns.update({(i, j): value for i, value in column.items() if value})
-    traces = (ad(data.group.algebra, k).trace() * ring.symbols[k] for k in range(middle, n))
-    return columns, sp.Mul(*(sp.exp(-trace) for trace in traces))
-
-
-def _combination(
-    ring: TrigonometricRing, row: list[Element], fractions: list[tuple[Element, Element]]
-) -> tuple[Element, Element]:
-    """sum of row[j] * fractions[j] over a common denominator."""
-    numerator, denominator = ring.ring.zero, ring.ring.one
-    for entry, (above, below) in zip(row, fractions, strict=True):
-        if not entry or not above:
-            continue
-        term = ring.reduce(entry * above)
-        if below == denominator:
-            numerator = numerator + term
-        elif below == ring.ring.one:
-            numerator = numerator + ring.reduce(term * denominator)
-        else:
-            numerator = ring.reduce(numerator * below + term * denominator)
-            numerator, denominator = ring.fraction(numerator, ring.reduce(denominator * below))
-    return numerator, denominator
+    def _factors(self, sign: int, start: int, stop: int) -> dict[int, SparseMatrix]:
+        """exp(sign g_k ad_k) for start <= k < stop."""
+        ring = self._ring
+        ops = cast(Arithmetic, ring)
+        return {
+            k: ExponentialEntries(ops, sign * ring.coordinates[k], self.data.adjoint[k], printed=True).sparse()
+            for k in range(start, stop)
+        }
 
 
 def wei_norman(group: MatrixGroup) -> WeiNorman:
