@@ -1,31 +1,33 @@
-"""lc.group: a group by its catalogue name or from a file."""
+"""lc.group: a group by its catalogue name, by the name of a family's member, or from a file."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
 
-from lie_codegen.errors import GroupFileError
-from lie_codegen.groups.catalogue_names import group_path
+from lie_codegen.groups.catalogue_names import definition_source, group_path, is_generated
+from lie_codegen.groups.families import family
 from lie_codegen.groups.group_file import parse_group_file
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 
 def group(name_or_path: str | Path) -> MatrixGroup:
-    """The group of a catalogue name such as "so3", or of a group file (a path that ends in .toml).
+    """The group of a catalogue name such as "so3", of a family such as "sl4", or of a group file (.toml).
 
     Raises:
         UnknownGroupError: no such name; lists those there are.
         GroupFileError, InputError: the file does not describe a group; names file, key and column.
     """
-    path = group_path(name_or_path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise GroupFileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return _parsed(data, str(path))
+    if is_generated(name_or_path):
+        return _generated(str(name_or_path))
+    return _parsed(definition_source(name_or_path), str(group_path(name_or_path)))
 
 
 @lru_cache(maxsize=64)
 def _parsed(data: bytes, where: str) -> MatrixGroup:
     return parse_group_file(data, where)
+
+
+@lru_cache(maxsize=64)
+def _generated(name: str) -> MatrixGroup:
+    return family(name)

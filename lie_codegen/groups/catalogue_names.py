@@ -1,19 +1,51 @@
-"""Where the catalogue's group files are; importable without SymPy."""
+"""Where groups come from by name: the catalogue's files and the families; importable without SymPy."""
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
-from lie_codegen.errors import UnknownGroupError
+from lie_codegen.errors import GroupFileError, UnknownGroupError
 
 _FOLDER = Path(__file__).parent / "catalogue"
+
+#: kind of family -> the form of its names; the first that matches is taken.
+_FAMILIES = {
+    "translations": r"r(\d{1,2})",
+    "orthogonal": r"so(\d)",
+    "pseudo_orthogonal": r"so_?(\d)_?(\d)",
+    "euclidean": r"se(\d)",
+    "extended_euclidean": r"se_(\d)_(\d)",
+    "unitary": r"su(\d)",
+    "special_linear": r"sl(\d)",
+    "general_linear": r"gl(\d)",
+    "symplectic": r"sp(\d{1,2})",
+    "heisenberg": r"h(\d{1,2})",
+}
+#: One member of each family, for messages and tests.
+FAMILY_EXAMPLES = ("r4", "so5", "so22", "se4", "se_3_3", "su4", "sl4", "gl3", "sp6", "h7")
 
 
 @cache
 def group_names() -> tuple[str, ...]:
-    """The names in the catalogue, sorted."""
+    """The names in the catalogue, sorted; families (so5, su4, ...) are made on demand and not listed."""
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+
+
+def family_of(name: str) -> tuple[str, tuple[int, ...]] | None:
+    """The family and the sizes a name stands for: "sl4" is ("special_linear", (4,)); None if it is no such name."""
+    for kind, pattern in _FAMILIES.items():
+        match = re.fullmatch(pattern, name, re.ASCII)
+        if match:
+            return kind, tuple(int(size) for size in match.groups())
+    return None
+
+
+def is_generated(name_or_path: str | Path) -> bool:
+    """Whether the group is made from its name alone: a member of a family without a file in the catalogue."""
+    text = str(name_or_path)
+    return text not in group_names() and family_of(text) is not None
 
 
 def group_path(name_or_path: str | Path) -> Path:
@@ -29,5 +61,22 @@ def group_path(name_or_path: str | Path) -> Path:
     if path.suffix == ".toml":
         return path
     raise UnknownGroupError(
-        f"no group {text!r} in the catalogue ({', '.join(group_names())}); a file of your own ends in .toml"
+        f"no group {text!r} in the catalogue ({', '.join(group_names())}) nor in its families "
+        f"({', '.join(FAMILY_EXAMPLES)}, and other sizes); a file of your own ends in .toml"
     )
+
+
+def definition_source(name_or_path: str | Path) -> bytes:
+    """What determines the group: the bytes of its file, or the name of a member of a family.
+
+    Raises:
+        UnknownGroupError: no such name; lists those there are.
+        GroupFileError: the file cannot be read.
+    """
+    if is_generated(name_or_path):
+        return f"family {name_or_path}".encode()
+    path = group_path(name_or_path)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise GroupFileError(f"{path}: cannot be read: {error.strerror or error}") from None

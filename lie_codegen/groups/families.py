@@ -7,13 +7,13 @@ with rotations of n axes comes in the lexicographic order of its planes: L12, L1
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from itertools import combinations
 
 import sympy as sp
 
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, UnknownGroupError
+from lie_codegen.groups.catalogue_names import FAMILY_EXAMPLES, family_of
 from lie_codegen.groups.definition import from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -23,33 +23,30 @@ Basis = dict[str, tuple[str, sp.ImmutableMatrix]]
 MAX_DIMENSION = 36
 
 
-def family(name: str) -> MatrixGroup | None:
-    """The group a family name such as "so5" stands for, or None if the name belongs to no family.
+def family(name: str) -> MatrixGroup:
+    """The group that a name such as "so5" stands for.
 
     Raises:
+        UnknownGroupError: if the name belongs to no family.
         InputError: if the family has no such member (sp5, h4), or one too large to derive.
     """
-    for pattern, description, basis in _FAMILIES:
-        match = re.fullmatch(pattern, name)
-        if match:
-            sizes = tuple(int(size) for size in match.groups())
-            elements = basis(*_checked(name, sizes))
-            if len(elements) > MAX_DIMENSION:
-                raise InputError(f"{name} has dimension {len(elements)}; groups up to {MAX_DIMENSION} are generated")
-            return from_matrices(
-                name,
-                tuple(elements),
-                [matrix for _, matrix in elements.values()],
-                units=[unit for unit, _ in elements.values()],
-                description=description.format(*sizes),
-            )
-    return None
-
-
-def _checked(name: str, sizes: tuple[int, ...]) -> tuple[int, ...]:
-    if max(sizes) > 40:
-        raise InputError(f"{name}: families are generated up to dimension {MAX_DIMENSION}")
-    return sizes
+    found = family_of(name)
+    if found is None:
+        raise UnknownGroupError(f"no family has a member {name!r}; there are {', '.join(FAMILY_EXAMPLES)}, and others")
+    kind, sizes = found
+    if max(sizes) > MAX_DIMENSION:
+        raise InputError(f"{name}: groups up to dimension {MAX_DIMENSION} are generated")
+    description, basis = _FAMILIES[kind]
+    elements = basis(*sizes)
+    if len(elements) > MAX_DIMENSION:
+        raise InputError(f"{name} has dimension {len(elements)}; groups up to {MAX_DIMENSION} are generated")
+    return from_matrices(
+        name,
+        tuple(elements),
+        [matrix for _, matrix in elements.values()],
+        units=[unit for unit, _ in elements.values()],
+        description=description.format(*sizes),
+    )
 
 
 def _need(holds: bool, message: str) -> None:
@@ -184,19 +181,19 @@ def _heisenberg(size: int) -> Basis:
     return basis if n > 1 else dict(zip("xyz", basis.values(), strict=True))
 
 
-#: (pattern of the name, description, basis); the first that matches is taken.
-_FAMILIES: tuple[tuple[str, str, Callable[..., Basis]], ...] = (
-    (r"r(\d{1,2})", "translations of R^{0}", _translations),
-    (r"so(\d)", "rotations of R^{0}", _orthogonal),
-    (r"so_?(\d)_?(\d)", "identity component of the isometries of R^({0},{1})", _pseudo_orthogonal),
-    (r"se(\d)", "rigid motions of R^{0}; rotations, then translations", _euclidean),
-    (r"se_(\d)_(\d)", "rotations of R^{1} with {0} copies of its vectors", _extended_euclidean),
-    (r"su(\d)", "special unitary {0} x {0} matrices, basis -i lambda_a / 2 (Gell-Mann)", _unitary),
-    (r"sl(\d)", "real {0} x {0} matrices of determinant 1; diagonal, upper, lower", _special_linear),
-    (r"gl(\d)", "real {0} x {0} matrices of positive determinant", _general_linear),
-    (r"sp(\d{1,2})", "real symplectic {0} x {0} matrices", _symplectic),
-    (r"h(\d{1,2})", "Heisenberg group of dimension {0}", _heisenberg),
-)
-
-#: What the families are called, for messages.
-FAMILY_NAMES = "r3, so5, so31, se4, se_2_3, su4, sl4, gl3, sp4, h5"
+#: kind -> (description, basis)
+_FAMILIES: dict[str, tuple[str, Callable[..., Basis]]] = {
+    "translations": ("translations of R^{0}", _translations),
+    "orthogonal": ("rotations of R^{0}", _orthogonal),
+    "pseudo_orthogonal": (
+        "identity component of the isometries of R^({0},{1}); rotations, then boosts",
+        _pseudo_orthogonal,
+    ),
+    "euclidean": ("rigid motions of R^{0}; rotations, then translations", _euclidean),
+    "extended_euclidean": ("rotations of R^{1} with {0} copies of its vectors", _extended_euclidean),
+    "unitary": ("special unitary {0} x {0} matrices, basis -i lambda_a / 2 (Gell-Mann)", _unitary),
+    "special_linear": ("real {0} x {0} matrices of determinant 1; diagonal, upper, lower", _special_linear),
+    "general_linear": ("real {0} x {0} matrices of positive determinant", _general_linear),
+    "symplectic": ("real symplectic {0} x {0} matrices; diagonal, upper and lower A, then B, C", _symplectic),
+    "heisenberg": ("Heisenberg group of dimension {0}", _heisenberg),
+}

@@ -176,7 +176,9 @@ class TrigonometricRing:
                 numerator, denominator = self.reduce(numerator * decay), self.reduce(denominator * decay)
         if len(denominator) == 1 or self.domain.is_negative(denominator.LC):
             unit = denominator.LC
-            numerator, denominator = numerator.mul_ground(1 / unit), denominator.mul_ground(1 / unit)
+            numerator, denominator = (
+                element.mul_ground(self.domain.one / unit) for element in (numerator, denominator)
+            )
         return numerator, denominator
 
     def quotient(self, numerator: Element, denominator: Element) -> sp.Expr:
