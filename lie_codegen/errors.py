@@ -116,3 +116,15 @@ class CacheWarning(UserWarning):
 
 class InertiaWarning(UserWarning):
     """An inertia that is a legal metric and belongs to no rigid body: the triangle inequality fails."""
+
+
+class PeriodError(InputError):
+    """An input is not periodic, or not with that period; names the component and offers the common period."""
+
+
+class AssumptionError(InputError):
+    """A condition of a theorem fails; names the theorem, the condition and what holds instead."""
+
+
+class AssumptionWarning(UserWarning):
+    """A theorem is used where one of its conditions fails; names both."""

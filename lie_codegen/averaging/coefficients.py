@@ -1,0 +1,202 @@
+"""The exact numbers of an averaging computation: Z, or Z[generators] where a coefficient is not rational.
+
+Every coefficient is an integer polynomial in generators over a common integer denominator that its signal carries.
+A generator is a parameter (an amplitude), a square root of a prime (kept reduced: its square is the prime), or any
+other number or function of the parameters that is not rational, such as pi, taken as it stands. Rational inputs
+need no generator: the coefficients are then plain Python integers, which is the fast path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import Any
+
+import sympy as sp
+from sympy.polys.domains import QQ, ZZ
+from sympy.polys.rings import PolyRing
+
+from lie_codegen.errors import InputError
+
+#: An int, or a PolyElement over ZZ.
+Coefficient = Any
+
+
+@dataclass(frozen=True)
+class CoefficientRing:
+    """Z[generators] modulo r^2 = p for the generators r that are square roots of primes.
+
+    Attributes:
+        generators: SymPy expressions, each standing for itself; empty for the integers.
+    """
+
+    generators: tuple[sp.Expr, ...] = ()
+
+    @staticmethod
+    def holding(values: Iterable[sp.Expr]) -> CoefficientRing:
+        """The smallest such ring with rational multiples of all the values."""
+        found: dict[sp.Expr, None] = {}
+        for value in values:
+            _walk(value, lambda generator: found.setdefault(generator))
+        return CoefficientRing(tuple(sorted(found, key=lambda g: g.sort_key())))
+
+    @cached_property
+    def squares(self) -> dict[int, int]:
+        """Position of a square-root generator -> its square."""
+        return {
+            k: int(g.base)
+            for k, g in enumerate(self.generators)
+            if isinstance(g, sp.Pow) and g.exp == sp.Rational(1, 2) and g.base.is_Integer
+        }
+
+    @cached_property
+    def polynomials(self) -> PolyRing:
+        """The polynomial ring over Z; its generators are named x0, x1, ..."""
+        return PolyRing([f"x{k}" for k in range(len(self.generators))], ZZ)
+
+    @cached_property
+    def multiply(self) -> Callable[[Coefficient, Coefficient], Coefficient]:
+        """The product, reduced."""
+        if not self.squares:
+            return lambda a, b: a * b
+        squares = tuple(self.squares.items())
+
+        def product(a: Coefficient, b: Coefficient) -> Coefficient:
+            value = a * b
+            return value if isinstance(value, int) else _reduced(value, squares)
+
+        return product
+
+    def element(self, value: sp.Expr) -> tuple[Coefficient, int]:
+        """(numerator, denominator) of a value in the ring.
+
+        Raises:
+            InputError: if the value needs a generator the ring does not have.
+        """
+        if value.is_Rational:
+            return int(value.p), int(value.q)
+        rational = self._rationals
+        image = _convert(value, rational, self._images)
+        denominator, cleared = image.clear_denoms()
+        numerator = self.polynomials.from_dict({monom: int(c) for monom, c in cleared.terms()})
+        return _reduced(numerator, tuple(self.squares.items())), int(denominator)
+
+    def constant(self, value: int) -> Coefficient:
+        """An integer as an element."""
+        return value
+
+    def expression(self, numerator: Coefficient, denominator: int = 1) -> sp.Expr:
+        """The SymPy value of numerator / denominator."""
+        if isinstance(numerator, int):
+            return sp.Rational(numerator, denominator)
+        terms = []
+        for monom, coefficient in numerator.terms():
+            factors = [g**e for g, e in zip(self.generators, monom, strict=True) if e]
+            terms.append(sp.Mul(sp.Rational(int(coefficient), denominator), *factors))
+        return sp.Add(*terms)
+
+    def number(self, numerator: Coefficient, denominator: int, values: tuple[Any, ...]) -> Any:
+        """The double nearest to numerator / denominator at numeric values of the generators (arrays allowed)."""
+        if isinstance(numerator, int):
+            return numerator / denominator
+        total: Any = 0.0
+        for monom, coefficient in numerator.terms():
+            term: Any = int(coefficient) / denominator
+            for value, exponent in zip(values, monom, strict=True):
+                if exponent:
+                    term = term * value**exponent
+            total = total + term
+        return total
+
+    def content(self, value: Coefficient) -> int:
+        """The greatest common divisor of the integers in an element."""
+        if isinstance(value, int):
+            return abs(value)
+        return math.gcd(*(int(c) for c in value.values()))
+
+    def divide(self, value: Coefficient, divisor: int) -> Coefficient:
+        """Exact division by an integer that divides the content."""
+        return value // divisor if isinstance(value, int) else value.quo_ground(ZZ(divisor))
+
+    @cached_property
+    def _rationals(self) -> PolyRing:
+        return PolyRing([f"x{k}" for k in range(len(self.generators))], QQ)
+
+    @cached_property
+    def _images(self) -> dict[sp.Expr, Any]:
+        return dict(zip(self.generators, self._rationals.gens, strict=True))
+
+
+def _reduced(value: Any, squares: tuple[tuple[int, int], ...]) -> Any:
+    """Even powers of square roots replaced by integers."""
+    for position, square in squares:
+        if any(monom[position] > 1 for monom in value):
+            result: dict[tuple[int, ...], int] = {}
+            for monom, coefficient in value.items():
+                half, odd = divmod(monom[position], 2)
+                key = (*monom[:position], odd, *monom[position + 1 :])
+                result[key] = result.get(key, 0) + coefficient * square**half
+            value = value.ring.from_dict({key: c for key, c in result.items() if c})
+    return value
+
+
+def _root_factors(value: sp.Expr) -> tuple[sp.Rational, list[sp.Expr]]:
+    """sqrt(p/q) as (rational, square roots of primes)."""
+    numerator, denominator = int(value.p), int(value.q)
+    outside = sp.Rational(1, denominator)
+    roots = []
+    for prime, exponent in sp.factorint(numerator * denominator).items():
+        outside *= sp.Integer(prime) ** (exponent // 2)
+        if exponent % 2:
+            roots.append(sp.sqrt(prime))
+    return outside, roots
+
+
+def _is_root(value: sp.Expr) -> bool:
+    return (
+        isinstance(value, sp.Pow)
+        and value.base.is_Rational
+        and value.base > 0
+        and value.exp.is_Rational
+        and value.exp.q == 2
+    )
+
+
+def _walk(value: sp.Expr, note: Callable[[sp.Expr], Any]) -> None:
+    """Report every generator a value needs."""
+    if value.is_Rational:
+        return
+    if _is_root(value):
+        for root in _root_factors(value.base)[1]:
+            note(root)
+    elif isinstance(value, sp.Add | sp.Mul):
+        for argument in value.args:
+            _walk(argument, note)
+    elif isinstance(value, sp.Pow) and value.exp.is_Integer and value.exp > 0:
+        _walk(value.base, note)
+    elif value.has(sp.I, sp.zoo, sp.nan, sp.oo, sp.Float):
+        raise InputError(f"{value} is not an exact real coefficient")
+    else:
+        note(value)
+
+
+def _convert(value: sp.Expr, ring: PolyRing, images: Mapping[sp.Expr, Any]) -> Any:
+    if value.is_Rational:
+        return ring.ground_new(QQ(int(value.p), int(value.q)))
+    if _is_root(value):
+        outside, roots = _root_factors(value.base)
+        power = (int(value.exp.p) - 1) // 2
+        outside *= value.base**power
+        start = ring.ground_new(QQ(int(outside.p), int(outside.q)))
+        return reduce(lambda a, root: a * images[root], roots, start)
+    if isinstance(value, sp.Add):
+        return reduce(lambda a, b: a + b, (_convert(argument, ring, images) for argument in value.args))
+    if isinstance(value, sp.Mul):
+        return reduce(lambda a, b: a * b, (_convert(argument, ring, images) for argument in value.args))
+    if isinstance(value, sp.Pow) and value.exp.is_Integer and value.exp > 0:
+        return _convert(value.base, ring, images) ** int(value.exp)
+    if value not in images:
+        raise InputError(f"{value} is not in the ring of coefficients")
+    return images[value]

@@ -1,0 +1,370 @@
+"""PeriodicInput: n periodic functions of time, exact where they are trigonometric polynomials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.algebra.exact import exact_number
+from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.averaging.sampled_signal import resolve
+from lie_codegen.averaging.trig_formula import NotTrigonometricError, trig_form
+from lie_codegen.averaging.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
+from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
+
+Array = NDArray[np.float64]
+
+#: The time in every formula.
+TIME = sp.Symbol("t", real=True)
+_PERIODIC_TO = 1e-9
+
+
+@dataclass(frozen=True)
+class PeriodicInput:
+    """u(t) with u(t + T) = u(t), callable: u(t) is (n,) for a scalar t and (..., n) for an array.
+
+    Sums, products and integer powers of sines and cosines of commensurate frequencies are kept as exact trigonometric
+    polynomials, with symbolic amplitudes and phases; any other formula of t is taken by its values (`exact` is False).
+
+    Attributes:
+        components: n formulas: texts in t, pi and the parameters (functions sin, cos, sqrt, ...), SymPy expressions, or
+            numbers.
+        period: T as a text, a number or a SymPy expression; the smallest common period if not given. [time unit]
+        parameters: names of symbolic amplitudes and phases.
+        breakpoints: times in (0, T) at which u or a derivative jumps.
+
+    Raises:
+        ExpressionError: a text outside the grammar, with the column.
+        PeriodError: incommensurate frequencies, or a T that is no common period (a common one is offered).
+        InputError: no component, an undeclared symbol.
+    """
+
+    components: tuple[Any, ...]
+    period: Any = None
+    parameters: tuple[str, ...] = ()
+    breakpoints: tuple[float, ...] = ()
+    waveform: Waveform = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        names = (self.parameters,) if isinstance(self.parameters, str) else tuple(self.parameters)
+        object.__setattr__(self, "parameters", names)
+        if isinstance(self.components, str | sp.Expr):
+            raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {self.components!r}")
+        object.__setattr__(self, "components", tuple(self.components))
+        if self.waveform is None:
+            object.__setattr__(self, "waveform", _waveform(self))
+        object.__setattr__(self, "period", self.waveform.period)
+        inside = tuple(sorted(float(b) for b in self.breakpoints))
+        object.__setattr__(self, "breakpoints", inside)
+
+    @staticmethod
+    def from_fourier(
+        cosines: ArrayLike = (), sines: ArrayLike = (), *, mean: ArrayLike | None = None, period: Any = "2*pi"
+    ) -> PeriodicInput:
+        """u(t) = mean + sum_k cosines[k-1] cos(2 pi k t / T) + sines[k-1] sin(2 pi k t / T).
+
+        Args:
+            cosines, sines: (K, n) coefficients: numbers, texts or SymPy numbers; floats at their exact binary value.
+            mean: (n,).
+            period: T.
+
+        Raises:
+            ShapeError: if the three do not agree in n.
+            NotFiniteError: NaN or infinity.
+        """
+        c, s = _coefficients(cosines, "cosines"), _coefficients(sines, "sines")
+        m = _coefficients([] if mean is None else [mean], "mean")
+        widths = {len(row) for table in (c, s, m) for row in table}
+        if len(widths) != 1:
+            raise ShapeError(
+                f"PeriodicInput.from_fourier: the coefficients have {sorted(widths)} components; give one n"
+            )
+        [n] = widths
+        omega = 2 * sp.pi / _number(period, "period", {})
+        zero = [sp.S.Zero] * n
+        terms = [list(m[0]) if m else zero]
+        terms += [[a * sp.cos((k + 1) * omega * TIME) for a in row] for k, row in enumerate(c)]
+        terms += [[b * sp.sin((k + 1) * omega * TIME) for b in row] for k, row in enumerate(s)]
+        return PeriodicInput(tuple(sp.Add(*(row[i] for row in terms)) for i in range(n)), period)
+
+    @staticmethod
+    def from_callable(
+        function: Callable[[Array], ArrayLike], period: Any, *, breakpoints: Sequence[float] = ()
+    ) -> PeriodicInput:
+        """A vectorised function on [0, T): (k,) -> (k, n), continued periodically; moments by quadrature.
+
+        Raises:
+            ShapeError: if the function does not return (k, n).
+            NotFiniteError: if it is NaN or infinite somewhere.
+        """
+        exact = _number(period, "period", {})
+        length = float(exact)
+        probe = np.asarray(function(np.linspace(0, length, 3, endpoint=False)), dtype=float)
+        if probe.ndim != 2 or probe.shape[0] != 3:
+            raise ShapeError(f"PeriodicInput.from_callable: 3 times gave shape {probe.shape}; they must give (3, n)")
+        panels, values = resolve(lambda t: np.asarray(function(t), dtype=float), length, breakpoints)
+        waveform = SampledWaveform(panels, values, lambda t: np.asarray(function(t), dtype=float), exact)
+        return PeriodicInput(("",) * probe.shape[1], exact, (), tuple(breakpoints), waveform)
+
+    @staticmethod
+    def from_samples(values: ArrayLike, period: Any) -> PeriodicInput:
+        """The trigonometric polynomial through (N, n) samples at t = 0, T/N, .., (N-1) T/N (N odd or even).
+
+        Raises:
+            ShapeError, NotFiniteError: naming `values`.
+        """
+        samples = np.asarray(values, dtype=float)
+        if samples.ndim != 2 or len(samples) < 2:
+            raise ShapeError(f"PeriodicInput.from_samples: values has shape {samples.shape}; give (N, n) with N >= 2")
+        if not np.all(np.isfinite(samples)):
+            raise NotFiniteError("PeriodicInput.from_samples: values holds NaN or infinity")
+        spectrum = np.fft.rfft(samples, axis=0) / len(samples)
+        top = len(spectrum) - 1
+        weights = np.full(top, 2.0)
+        if len(samples) % 2 == 0:
+            weights[-1] = 1.0
+        cosines = weights[:, None] * spectrum[1:].real
+        sines = -weights[:, None] * spectrum[1:].imag
+        return PeriodicInput.from_fourier(cosines, sines, mean=spectrum[0].real, period=period)
+
+    @staticmethod
+    def from_pieces(pieces: Sequence[tuple[Any, Sequence[Any]]]) -> PeriodicInput:
+        """Formulas valid on successive intervals: [(t_1, formulas on [0, t_1)), .., (T, formulas on [t_{m-1}, T))].
+
+        Each formula is in the time t of the whole period. The moments are by quadrature, exact to rounding.
+
+        Raises:
+            InputError: if the ends do not increase from 0, or a formula is not understood.
+        """
+        ends = [float(_number(end, "the end of a piece", {})) for end, _ in pieces]
+        if not ends or any(b <= a for a, b in zip([0.0, *ends], ends, strict=False)):
+            raise InputError(f"PeriodicInput.from_pieces: the ends {ends} must increase from above 0")
+        formulas = [[_formula(entry, {}) for entry in entries] for _, entries in pieces]
+        if len({len(row) for row in formulas}) != 1:
+            raise ShapeError("PeriodicInput.from_pieces: every piece must have the same number of components")
+        functions = [_compiled(row) for row in formulas]
+
+        def evaluate(t: Array) -> Array:
+            index = np.clip(np.searchsorted(ends, t, side="right"), 0, len(ends) - 1)
+            result = np.empty((len(t), len(formulas[0])))
+            for piece, function in enumerate(functions):
+                here = index == piece
+                result[here] = function(t[here])
+            return result
+
+        return PeriodicInput.from_callable(evaluate, pieces[-1][0], breakpoints=ends[:-1])
+
+    @property
+    def dim(self) -> int:
+        """n, the number of components."""
+        return self.waveform.dim
+
+    @property
+    def exact(self) -> bool:
+        """Whether the input is an exact trigonometric polynomial."""
+        return self.waveform.exact
+
+    @property
+    def T(self) -> float:
+        """The period as a double."""
+        return float(self.period)
+
+    @property
+    def symbols(self) -> tuple[sp.Symbol, ...]:
+        """The parameters that occur, as SymPy symbols."""
+        return self.waveform.parameters
+
+    @cached_property
+    def exact_mean(self) -> sp.ImmutableMatrix:
+        """(n, 1) u_av = (1/T) int_0^T u."""
+        calculus, u = self.waveform.calculus({}, self.dim)
+        return self.waveform.expressions(calculus, calculus.mean(u), self.dim, TIME)
+
+    @property
+    def mean(self) -> Array:
+        """(n,) u_av in doubles."""
+        return np.array([float(value) for value in self.exact_mean])
+
+    @cached_property
+    def zero_mean(self) -> bool:
+        """Whether u_av = 0 identically."""
+        calculus, u = self.waveform.calculus({}, self.dim)
+        return self.waveform.vanishes(calculus, calculus.mean(u))
+
+    @cached_property
+    def expressions(self) -> sp.ImmutableMatrix:
+        """(n, 1) the normal form: sums of sines and cosines of multiples of 2 pi t / T.
+
+        Raises:
+            InputError: for a sampled input.
+        """
+        calculus, u = self.waveform.calculus({}, self.dim)
+        return self.waveform.expressions(calculus, u, self.dim, TIME)
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """u(t): scalar t -> (n,), (...,) -> (..., n)."""
+        return self._evaluate(np.asarray(t, dtype=float))
+
+    def integral(self, t: ArrayLike) -> Array:
+        """ut(t) = int_0^t u, any t: (...,) -> (..., n)."""
+        return self._integrate(np.asarray(t, dtype=float))
+
+    def at(self, **values: Any) -> PeriodicInput:
+        """The input with numbers (floats at their exact binary value) in place of parameters.
+
+        Raises:
+            InputError: for a name that is not a parameter.
+        """
+        for name in values:
+            if name not in self.parameters:
+                raise InputError(
+                    f"PeriodicInput.at: {name!r} is not a parameter; they are {', '.join(self.parameters)}"
+                )
+        if not values:
+            return self
+        numbers = {_symbol(name): _binary(value) for name, value in values.items()}
+        left = tuple(name for name in self.parameters if name not in values)
+        if not isinstance(self.waveform, TrigWaveform):
+            return self
+        return PeriodicInput(self.components, None, left, self.breakpoints, with_values(self.waveform, numbers))
+
+    def linear(self, matrix: Any) -> PeriodicInput:
+        """C u for a constant (m, n) matrix (exact entries, or floats at their exact binary value).
+
+        Raises:
+            ShapeError: if the matrix has not n columns.
+        """
+        exact = sp.ImmutableMatrix([[_binary(value) for value in row] for row in _rows(matrix)])
+        if exact.cols != self.dim:
+            raise ShapeError(
+                f"PeriodicInput.linear: the matrix has {exact.cols} columns, the input {self.dim} components"
+            )
+        if isinstance(self.waveform, TrigWaveform):
+            form = linear_image(self.waveform.form, exact)
+            moved = TrigWaveform(form, self.waveform.order)
+            return PeriodicInput(("",) * exact.rows, self.period, self.parameters, self.breakpoints, moved)
+        numeric = np.array(exact.tolist(), dtype=float)
+        inner = self.waveform
+        return PeriodicInput.from_callable(lambda t: self(t) @ numeric.T, inner.period, breakpoints=self.breakpoints)
+
+    @cached_property
+    def _evaluate(self) -> Callable[[Array], Array]:
+        waveform = self.waveform
+        if isinstance(waveform, SampledWaveform):
+            length, dim = waveform.panels.period, self.dim
+            return lambda t: waveform.function(np.mod(t, length).ravel()).reshape(*t.shape, dim)
+        calculus, u = waveform.calculus({}, self.dim)
+        return waveform.evaluator(calculus, u, self.dim)
+
+    @cached_property
+    def _integrate(self) -> Callable[[Array], Array]:
+        calculus, u = self.waveform.calculus({}, self.dim)
+        constant = calculus.mean(u)
+        wave = calculus.primitive(calculus.combine([(1, u), (-1, constant)]))
+        periodic = self.waveform.evaluator(calculus, wave, self.dim)
+        drift = self.mean
+        return lambda t: periodic(t) + t[..., None] * drift
+
+
+def _waveform(u: PeriodicInput) -> Waveform:
+    """The waveform of formulas."""
+    if not u.components:
+        raise InputError("PeriodicInput: no component; give one formula for each direction of the group")
+    symbols = {name: _symbol(name) for name in u.parameters}
+    formulas = tuple(_formula(entry, symbols) for entry in u.components)
+    period = None if u.period is None else _number(u.period, "period", symbols)
+    if period is not None and not period.free_symbols and not float(period) > 0:
+        raise PeriodError(f"PeriodicInput: the period {u.period} is not positive")
+    try:
+        form = trig_form(formulas, TIME, period, "PeriodicInput")
+        return TrigWaveform(form, tuple(symbols.values()))
+    except NotTrigonometricError as error:
+        return _sampled(u, formulas, period, str(error))
+
+
+def _sampled(u: PeriodicInput, formulas: tuple[sp.Expr, ...], period: sp.Expr | None, culprit: str) -> Waveform:
+    free = set().union(*(formula.free_symbols for formula in formulas)) - {TIME}
+    if free:
+        raise InputError(
+            f"PeriodicInput: {culprit} is not a sum of sines and cosines, so the input is taken by its values, and the "
+            f"parameters {', '.join(sorted(map(str, free)))} have none; put numbers in their place"
+        )
+    if period is None or period.free_symbols:
+        raise PeriodError(f"PeriodicInput: {culprit} is not a sum of sines and cosines; give its period")
+    length = float(period)
+    function = _compiled(formulas)
+    probe = length * np.array([0.0131, 0.271828, 0.577215, 0.8314159])
+    here, later = function(probe), function(probe + length)
+    off = np.max(np.abs(later - here), axis=0)
+    bad = np.flatnonzero(~(off <= _PERIODIC_TO * np.maximum(1.0, np.max(np.abs(here), axis=0))))
+    if len(bad):
+        raise PeriodError(
+            f"PeriodicInput: component {bad[0] + 1}, {u.components[bad[0]]}, is not periodic with period {period}: it "
+            f"changes by {off[bad[0]]:.3g} over one; pieces that start anew each period go to PeriodicInput.from_pieces"
+        )
+    panels, values = resolve(function, length, u.breakpoints)
+    return SampledWaveform(panels, values, function, period)
+
+
+def _compiled(formulas: Sequence[sp.Expr]) -> Callable[[Array], Array]:
+    """(k,) -> (k, n) from formulas of t alone."""
+    functions = [sp.lambdify(TIME, formula, "numpy", cse=True) for formula in formulas]
+
+    def evaluate(t: Array) -> Array:
+        times = np.asarray(t, dtype=float)
+        return np.stack([np.broadcast_to(np.asarray(f(times), dtype=float), times.shape) for f in functions], axis=-1)
+
+    return evaluate
+
+
+def _symbol(name: str) -> sp.Symbol:
+    if not isinstance(name, str) or not name.isidentifier() or name in ("t", "pi"):
+        raise InputError(f"PeriodicInput: {name!r} cannot name a parameter")
+    return sp.Symbol(name, real=True)
+
+
+def _formula(entry: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
+    if isinstance(entry, str):
+        return parse_expression(entry, {"t": TIME, "pi": sp.pi, **symbols}, FORMULA_FUNCTIONS)
+    if isinstance(entry, sp.Expr):
+        known = {"t": TIME, **symbols}
+        for symbol in entry.free_symbols:
+            if str(symbol) not in known:
+                raise InputError(f"PeriodicInput: {symbol} in {entry} is not declared; name it in `parameters`")
+        return entry.xreplace({symbol: known[str(symbol)] for symbol in entry.free_symbols})
+    return exact_number(entry)
+
+
+def _number(value: Any, what: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
+    if isinstance(value, float | np.floating):
+        return _binary(value)
+    result = _formula(value, symbols)
+    if result.has(TIME):
+        raise InputError(f"PeriodicInput: {what} {value!r} depends on t")
+    return result
+
+
+def _binary(value: Any) -> sp.Expr:
+    """A number exactly; a float at its binary value."""
+    if isinstance(value, float | np.floating):
+        if not np.isfinite(value):
+            raise NotFiniteError(f"PeriodicInput: {value} is not finite")
+        return sp.Rational(*float(value).as_integer_ratio())
+    return exact_number(value)
+
+
+def _coefficients(table: Any, what: str) -> list[list[sp.Expr]]:
+    try:
+        return [[_binary(value) for value in row] for row in _rows(table)]
+    except TypeError:
+        raise ShapeError(f"PeriodicInput.from_fourier: {what} must be rows of n coefficients") from None
+
+
+def _rows(table: Any) -> list[list[Any]]:
+    return table.tolist() if isinstance(table, np.ndarray | sp.MatrixBase) else [list(row) for row in table]
