@@ -59,19 +59,16 @@ def generate(what: Buildable, folder: str | Path) -> Path:
 
 
 def _build_named(what: str | Path) -> Library:
-    from lie_codegen.groups.catalogue_names import group_path
+    from lie_codegen.groups.catalogue_names import definition_source
 
-    path = group_path(what)
+    source = definition_source(what).decode("utf-8", errors="replace")
 
     def kernels() -> Sequence[Kernel]:
         from lie_codegen.groups.catalogue_load import group
 
         return _kernels_of(group(what))
 
-    text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    if not text:
-        return build_kernels(kernels, definition=None)
-    return build_kernels(kernels, definition=f"file\n{text}")
+    return build_kernels(kernels, definition=f"file\n{source}")
 
 
 def _kernels_of(group: MatrixGroup) -> tuple[Kernel, ...]:
