@@ -67,7 +67,7 @@ def test_the_trajectory_stays_on_the_group_over_a_million_steps() -> None:
 
 def test_the_end_of_the_chart_is_an_error_that_names_the_time_not_a_nan() -> None:
     so3 = lc.group("so3")
-    run = lc.simulate(so3, [0.0, 1.0, 0.2], t=np.linspace(0, 4, 81))
+    run = lc.simulate(so3, [0.0, 1.0, 0.0], t=np.linspace(0, 4, 81))
     assert np.all(np.isfinite(run.X))
     with pytest.raises(ChartError, match=r"between t = 1\.\d+ and t = 1\.\d+"):
         _ = run.g
@@ -86,6 +86,16 @@ def test_breakpoints_are_stepped_on_exactly() -> None:
     x, y, z = h3.basis
     np.testing.assert_allclose(run.X[-1], expm(0.3 * x) @ expm(0.8 * y) @ expm(0.9 * z), rtol=0, atol=1e-11)
     assert run.steps < 5000
+
+
+def test_finite_escape_is_an_error_too() -> None:
+    sl2 = lc.group("sl2")
+    run = lc.simulate(sl2, [0.0, 1.0, -1.0], t=np.linspace(0, 2, 41))
+    with pytest.raises(ChartError, match=r"t = 1\.5"):
+        _ = run.g
+    t = 1.5
+    g = lc.simulate(sl2, [0.0, 1.0, -1.0], t=[0.0, t]).g[-1]
+    np.testing.assert_allclose(g, [-np.log(np.cos(t)), np.sin(t) * np.cos(t), -np.tan(t)], rtol=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -68,15 +68,13 @@ def _draw(plan: Any, best: Any, t: Any, g: Any, mean: Any) -> Any:
     figure.suptitle("Two wheels, three axes: attitude by the area rule (TR 93-59, Figures 2 and 3)", fontsize=13)
     u, optimal = plan.u(t), best.u(t)
     for axes, column, name in zip(top, (0, 1), ("1", "2"), strict=True):
-        axes.plot(t, u[:, column], color=_BLUE, label="area rule")
-        axes.plot(t, optimal[:, column], color=_GREY, lw=1.2, label="minimum energy")
+        axes.plot(t, u[:, column], color=_BLUE, label="controls by the area rule")
+        axes.plot(t, optimal[:, column], color=_GREY, lw=1.2, label="controls of minimum energy")
         axes.set(title=f"Figure 2: control $\\epsilon u_{name}$", ylabel="rad/s")
-    top[0].legend(loc="upper right", frameon=False)
     for axes, column, letter in ((middle[0], 0, "a"), (middle[1], 1, "b"), (bottom[1], 2, "d")):
-        axes.plot(t, mean[:, column], color=_BLUE, label="average")
-        axes.plot(t, g[:, column], "--", color=_RED, label="actual")
+        axes.plot(t, mean[:, column], color=_BLUE, label="second-order average")
+        axes.plot(t, g[:, column], "--", color=_RED, label="actual motion")
         axes.set(title=f"Figure 3({letter}): $g_{column + 1}$", ylabel="rad")
-    middle[0].legend(loc="lower right", frameon=False)
     loop = integrals(plan, t)
     bottom[0].fill(loop[:, 0], loop[:, 1], color=_BLUE, alpha=0.12)
     bottom[0].plot(loop[:, 0], loop[:, 1], color=_BLUE)
@@ -85,6 +83,8 @@ def _draw(plan: Any, best: Any, t: Any, g: Any, mean: Any) -> Any:
         xlabel="$\\epsilon\\tilde u_1$ [rad]",
         ylabel="$\\epsilon\\tilde u_2$ [rad]",
     )
+    shown = [handle for axes in (top[0], middle[0]) for handle in axes.get_legend_handles_labels()[0]]
+    figure.legend(handles=shown, loc="outside lower center", ncols=4, frameon=False)
     for axes in (*top, *middle, bottom[1]):
         axes.set_xlabel("t [s]")
     for axes in (*top, *middle, *bottom):

@@ -15,6 +15,8 @@ from lie_codegen.simulation.libraries import integrators
 Array = NDArray[Any]
 
 _AGREEMENT = 1e-9
+#: log det M above which the chart's edge is reached to rounding.
+_EDGE = 32.0
 
 
 def follow_chart(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], X: Array) -> Array:
@@ -27,19 +29,27 @@ def follow_chart(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Ar
     u0, um, u1 = samples
     with np.errstate(all="ignore"):
         every = lib.wei_norman_step.scan(np.zeros(group.dim), n=grid.steps, every=1, u0=u0, um=um, u1=u1, h=grid.h)
-        g = np.array(every[grid.outputs])
+        inside = np.cumprod(_inside(group, every)).astype(bool)[grid.outputs]
         relative = np.linalg.inv(X[0]) @ X
-        g = newton(group, g, relative)
+        g = newton(group, np.array(every[grid.outputs]), relative)
         off = mismatch(group, g, relative)
-    bad = np.flatnonzero(~(off <= _AGREEMENT * np.maximum(1.0, np.max(np.abs(relative), axis=(1, 2)))))
+    bad = np.flatnonzero(~(inside & (off <= _AGREEMENT * np.maximum(1.0, np.max(np.abs(relative), axis=(1, 2))))))
     if len(bad):
-        last = grid.knots[grid.at[max(bad[0] - 1, 0)]]
+        last, first = grid.knots[grid.at[max(bad[0] - 1, 0)]], grid.knots[grid.at[bad[0]]]
         raise ChartError(
-            f"{group.name}: the Wei-Norman chart in the order {', '.join(group.labels)} ends between t = {last:.6g} and "
-            f"t = {grid.knots[grid.at[bad[0]]]:.6g}; the trajectory itself (.X) is right; restart the coordinates "
-            "before that time or reorder the basis"
+            f"{group.name}: the Wei-Norman chart in the order {', '.join(group.labels)} ends between t = {last:.6g} "
+            f"and t = {first:.6g}; the trajectory itself (.X) is right; restart the coordinates before that time "
+            "or reorder the basis"
         )
     return g
+
+
+def _inside(group: MatrixGroup, g: Array) -> Array:
+    """(k,) whether det M(g)^-1 is finite and positive, as at g = 0; the chart ends where it vanishes."""
+    finite = np.all(np.isfinite(g), axis=1)
+    M = integrators(group).wei_norman_matrix.batch(np.where(finite[:, None], g, 0.0))
+    sign, size = np.linalg.slogdet(np.where(np.isfinite(M), M, 0.0))
+    return np.asarray(finite & (sign > 0) & (size < _EDGE))
 
 
 def newton(group: MatrixGroup, g: Array, X: Array, iterations: int = 4) -> Array:
