@@ -417,3 +417,11 @@ def test_kernels_may_not_hide_attributes_of_the_library() -> None:
 def test_no_kernels_is_an_error() -> None:
     with pytest.raises(CodegenError, match="no kernel"):
         build_kernels(lambda: [])
+
+
+def test_versions_are_those_of_the_distributions() -> None:
+    from importlib import metadata
+
+    from lie_codegen.runtime.digests import versions
+
+    assert versions() == {name: metadata.version(name) for name in ("casadi", "sympy", "jinja2")}

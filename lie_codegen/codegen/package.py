@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.codegen.opcodes import c_literal
-from lie_codegen.codegen.signature import Signature
+from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.tape import tape_of
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.vectors import TestVector, make_vectors
-from lie_codegen.codegen.views import PackageMetadata, PackageView, is_step, package_view
+from lie_codegen.codegen.views import PackageMetadata, PackageView, package_view
 from lie_codegen.codegen.write import GENERATOR
 from lie_codegen.errors import CodegenError
 from lie_codegen.identifiers import check_identifier

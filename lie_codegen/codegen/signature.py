@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -40,6 +41,19 @@ class Signature:
             formula=data["formula"],
             source=data["source"],
         )
+
+
+def is_step(inputs: Sequence[Port], outputs: Sequence[Port]) -> bool:
+    """Whether the first output has the type of the first input, so that the kernel can be iterated."""
+    if not inputs:
+        return False
+    state, after = inputs[0], outputs[0]
+    return (state.shape, state.is_complex) == (after.shape, after.is_complex)
+
+
+def python_field(name: str) -> str:
+    """The name of an output as an attribute of a Python result."""
+    return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def _ports(data: Sequence[dict[str, Any]]) -> tuple[Port, ...]:

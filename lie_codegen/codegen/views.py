@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import keyword
 import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from lie_codegen.codegen.opcodes import C99, RESERVED, Target
+from lie_codegen.codegen.signature import is_step
 from lie_codegen.codegen.tape import Tape
 from lie_codegen.kernels.kernel import Kernel, Port
 
@@ -164,23 +164,10 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99) -> KernelView:
     )
 
 
-def is_step(inputs: Sequence[Port], outputs: Sequence[Port]) -> bool:
-    """Whether the first output has the type of the first input, so that the kernel can be iterated."""
-    if not inputs:
-        return False
-    state, after = inputs[0], outputs[0]
-    return (state.shape, state.is_complex) == (after.shape, after.is_complex)
-
-
 def comment_lines(text: str) -> tuple[str, ...]:
     """Text wrapped and made safe inside a C comment, whoever wrote it."""
     lines = [part for line in text.splitlines() for part in (textwrap.wrap(line, _WIDTH) or [""])]
     return tuple(_safe(line) for line in lines)
-
-
-def python_field(name: str) -> str:
-    """The name of an output as an attribute of a Python result."""
-    return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def _safe(text: str) -> str:

@@ -12,8 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from lie_codegen.codegen.signature import Signature
-from lie_codegen.codegen.views import is_step
+from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.errors import CacheError
 from lie_codegen.runtime.arguments import dtype_of
 

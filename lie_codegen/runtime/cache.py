@@ -16,7 +16,6 @@ import json
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -115,6 +114,8 @@ def scratch(folder: Path) -> Iterator[Path]:
     """
     parent = folder / "scratch"
     parent.mkdir(mode=0o700, exist_ok=True)
+    import tempfile
+
     home = Path(tempfile.mkdtemp(prefix="build-", dir=parent))
     try:
         yield home
@@ -129,6 +130,8 @@ def write_json(path: Path, data: Any) -> None:
         OSError: it cannot be written; the old file is untouched.
     """
     path.parent.mkdir(mode=0o700, exist_ok=True)
+    import tempfile
+
     descriptor, name = tempfile.mkstemp(prefix=".new-", dir=path.parent)
     try:
         with open(descriptor, "w", encoding="utf-8") as file:

@@ -6,7 +6,6 @@ import atexit
 import os
 import shutil
 import stat
-import tempfile
 import warnings
 from functools import cache
 from pathlib import Path
@@ -76,6 +75,8 @@ def _warn_once(reason: str) -> None:
 
 @cache
 def _temporary() -> Path:
+    import tempfile
+
     try:
         folder = Path(tempfile.mkdtemp(prefix="lie_codegen-"))
     except OSError as error:

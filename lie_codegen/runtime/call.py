@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.codegen.signature import Signature
-from lie_codegen.codegen.views import is_step, python_field
+from lie_codegen.codegen.signature import Signature, is_step, python_field
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.runtime.arguments import Array, bind, checked, describe, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.backend import Backend

@@ -11,7 +11,6 @@ import importlib.util
 import os
 import shlex
 import shutil
-import subprocess
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
@@ -91,6 +90,8 @@ def compile_library(compiler: Compiler, folder: Path, main: str, output: str, fl
     Raises:
         CompileError: with the command and what the compiler printed.
     """
+    import subprocess  # not needed where the cache has the answer
+
     attempts = [flags]
     if NATIVE in flags:
         attempts.append(tuple(flag for flag in flags if flag != NATIVE))

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
+import re
+import sys
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 #: Distributions whose version may change the C text.
 _DISTRIBUTIONS = ("casadi", "sympy", "jinja2")
+_METADATA_FOLDER = re.compile(r"([A-Za-z0-9_.]+)-([^-]+)\.(?:dist|egg)-info")
 
 
 def digest(data: Any) -> str:
@@ -21,13 +24,17 @@ def digest(data: Any) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Version of each distribution, read without importing it."""
-    found = {}
-    for name in _DISTRIBUTIONS:
+    """Version of each distribution, from the name of its metadata folder: nothing is imported."""
+    found = dict.fromkeys(_DISTRIBUTIONS, "")
+    for folder in reversed(sys.path):
         try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "absent"
+            names = os.listdir(folder or ".")
+        except OSError:
+            continue
+        for name in names:
+            match = _METADATA_FOLDER.fullmatch(name)
+            if match and match[1].lower() in found:
+                found[match[1].lower()] = match[2]
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -36,6 +35,8 @@ class Library:
 
     def __getattr__(self, name: str) -> Compiled:
         functions = self.__dict__.get("_functions", {})
+        import difflib
+
         close = difflib.get_close_matches(name, functions, n=3) if not name.startswith("_") else []
         hint = f"; near: {', '.join(close)}" if close else f"; it has {', '.join(functions)}"
         raise AttributeError(f"the library {self.__dict__.get('namespace')} has no kernel {name!r}{hint}")
