@@ -1,0 +1,47 @@
+"""Euler-Poincare equations on any Lie group, exact: I xi' = ad*_xi I xi + f (10).
+
+On SO(3) they are Euler's equations I omega' = I omega x omega + tau; printed (3) of Geyer's paper, I omega' - omega
+x I omega = tau, has the other sign, which conserves energy and |I omega| as well: only the spatial momentum R I
+omega tells them apart. On SE(3) with I = diag(J, M) they are Kirchhoff's equations (27). Bullo and Murray, CIT-CDS
+97-003, section 2.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from lie_codegen.algebra.lie_algebra import LieAlgebra
+
+
+def ad_star(algebra: LieAlgebra, x: Sequence[sp.Expr], a: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """ad*_x a with <ad*_x a, y> = <a, [x, y]>, exact."""
+    result: list[sp.Expr] = [sp.S.Zero] * algebra.dim
+    for i, j, k, value in algebra.constants():
+        result[j] += value * x[i] * a[k]
+    return result
+
+
+def bracket(algebra: LieAlgebra, x: Sequence[sp.Expr], y: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """[x, y], exact."""
+    result: list[sp.Expr] = [sp.S.Zero] * algebra.dim
+    for i, j, k, value in algebra.constants():
+        result[k] += value * x[i] * y[j]
+    return result
+
+
+def velocity_symbols(algebra: LieAlgebra) -> tuple[sp.Symbol, ...]:
+    """xi1 .. xin."""
+    return tuple(sp.Symbol(f"xi{i + 1}", real=True) for i in range(algebra.dim))
+
+
+def euler_poincare(
+    algebra: LieAlgebra, inertia: sp.MatrixBase, xi: Sequence[sp.Expr], force: Sequence[sp.Expr] | None = None
+) -> list[sp.Expr]:
+    """xi' = I^{-1} (ad*_xi I xi + f), expanded."""
+    momentum = list(inertia * sp.Matrix(list(xi)))
+    total = ad_star(algebra, xi, momentum)
+    if force is not None:
+        total = [a + b for a, b in zip(total, force, strict=True)]
+    return [sp.expand(entry) for entry in inertia.inv() * sp.Matrix(total)]
