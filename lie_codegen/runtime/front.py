@@ -54,8 +54,15 @@ def generate(what: Buildable, folder: str | Path) -> Path:
     group, kernels = _group_or_kernels(what)
     if group is None:
         return generate_package(kernels, folder, namespace=_namespace(kernels))
-    metadata = PackageMetadata(title=group.name, description=group.description, labels=group.labels, units=group.units)
+    metadata = PackageMetadata(title=group.name, description=_about(group), labels=group.labels, units=group.units)
     return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata)
+
+
+def _about(group: MatrixGroup) -> str:
+    """The description and the matrices: a representation found from brackets is nowhere else to be read."""
+    basis = zip(group.labels, group.exact_basis, strict=True)
+    rows = [f"{label} = [{'; '.join(' '.join(map(str, row)) for row in matrix.tolist())}]" for label, matrix in basis]
+    return "\n".join([line for line in (group.description,) if line] + ["Basis, row by row:", *rows])
 
 
 def _build_named(what: str | Path) -> Library:
