@@ -29,6 +29,9 @@ _FRONT_DOOR = {
     "generate": "lie_codegen.runtime.front",
     "simulate": "lie_codegen.simulation.flow",
     "steer": "lie_codegen.steering.front",
+    "elliptic_kernels": "lie_codegen.kernels.elliptic_kernels",
+    "free_rigid_body": "lie_codegen.studies.rigid_body",
+    "euler_average": "lie_codegen.studies.euler_average",
 }
 
 __all__ = ["__version__", "errors", *_FRONT_DOOR]
