@@ -117,4 +117,5 @@ def taylor(j: int) -> Fraction:
 @cache
 def remainder(j: int) -> Fraction:
     """The coefficient of mu^j in T(mu) - 2 / (4 pi^2 + mu), to 40 digits or more."""
-    return taylor(j + 1) - Fraction(2) * (-1) ** j / four_pi_squared() ** (j + 1)
+    pole: Fraction = Fraction(2) * (-1) ** j / four_pi_squared() ** (j + 1)
+    return taylor(j + 1) - pole

@@ -9,6 +9,7 @@ Rossmann, Lie Groups (2002), 1.2, Theorem 5; Chirikjian, Stochastic Models, Info
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
@@ -26,10 +27,11 @@ from lie_codegen.kernels.matrix_function import (
     RIGHT_JACOBIAN_INVERSE,
     FunctionOfMatrix,
     LinearFamily,
+    MatrixFunction,
 )
 from lie_codegen.kernels.rkmk import hat_body
 
-_FUNCTIONS = {
+_FUNCTIONS: dict[tuple[str, bool], MatrixFunction] = {
     ("left", False): LEFT_JACOBIAN,
     ("right", False): RIGHT_JACOBIAN,
     ("left", True): LEFT_JACOBIAN_INVERSE,
@@ -63,8 +65,6 @@ def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: 
 
 def _by_quadrature(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], *, inverse: bool) -> Matrix:
     """ljac(x) = Ad(H) S with S = int_{-1/2}^{1/2} Ad(exp(s x)) ds and H = exp(x/2); the inverse is S^{-1} Ad(H^{-1})."""
-    from fractions import Fraction
-
     n = data.group.dim
     functions = EvenOddExponentials(ops, hat_body(data.group, ops, x))
     even, odd = functions.cosh(Fraction(1, 2)), functions.sinh(Fraction(1, 2))
@@ -87,8 +87,12 @@ def _conjugate(ops: Arithmetic, data: GroupDerivation, X: Matrix, x: Sequence[Sc
 
 def coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
     """The x with hat(x) = A, from as few entries as determine it; A real or Complex, in the algebra."""
-    real = real_rows(A) if data.group.is_complex else A
-    return [dot([number(ops, c) for c in row.values()], [real[i][j] for i, j in row]) for row in data.real.coordinates]
+    return real_coordinates(ops, data, real_rows(A) if data.group.is_complex else A)
+
+
+def real_coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
+    """The x with hat(x) = A, for A in its real form."""
+    return [dot([number(ops, c) for c in row.values()], [A[i][j] for i, j in row]) for row in data.real.coordinates]
 
 
 def _averaged(ops: Arithmetic, data: GroupDerivation, functions: EvenOddExponentials) -> Matrix:

@@ -8,9 +8,11 @@ from functools import cached_property
 import sympy as sp
 
 from lie_codegen.algebra.adjoint import ad
+from lie_codegen.algebra.block_structure import diagonal_blocks
 from lie_codegen.algebra.spectral_pattern import ColumnPattern, spectral_pattern
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.kernels.log_structure import LogStructure, log_structure
 from lie_codegen.kernels.wei_norman_body import WeiNormanData
 
 
@@ -48,3 +50,23 @@ class GroupDerivation:
     def adjoint_pattern(self) -> tuple[ColumnPattern, ...] | None:
         """Annihilating polynomials of ad x, column by column."""
         return spectral_pattern(self.ads)
+
+    @cached_property
+    def log_structure(self) -> LogStructure | None:
+        """The blocks the logarithm is read from; None where one is of no known kind."""
+        return log_structure(self.group)
+
+    @cached_property
+    def section_pattern(self) -> tuple[ColumnPattern, ...] | None:
+        """Annihilating polynomials of ad x for the x that the blocks alone determine."""
+        structure = self.log_structure
+        pivots = structure.pivots if structure is not None else ()
+        zero = sp.zeros(self.group.dim, self.group.dim)
+        return spectral_pattern([self.ads[i] if i in pivots else zero for i in range(self.group.dim)])
+
+    @cached_property
+    def real_block_of(self) -> tuple[int, ...]:
+        """For each row of the real form, the number of its diagonal block in the group's own matrices."""
+        d = self.group.degree
+        place = {i: b for b, block in enumerate(diagonal_blocks(self.group.exact_basis)) for i in block}
+        return tuple(place[i % d] for i in range(self.real.size))

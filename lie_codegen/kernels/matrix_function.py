@@ -137,7 +137,7 @@ class LinearFamily:
 
     def form(self, form: QuadraticForm) -> Scalar:
         """q(x)."""
-        return self._signed(self._polynomial({key: value for key, value in form.coefficients}))
+        return self._signed(self._polynomial(dict(form.coefficients)))
 
     def apply(self, column: Mapping[int, Scalar]) -> Sparse:
         """A v for a sparse v."""
@@ -210,9 +210,26 @@ class FunctionOfMatrix:
 
     def column(self, j: int) -> Sparse:
         """f(A) e_j."""
-        pattern = self.patterns[j]
+        return self._sum(self.patterns[j], _Krylov(self.family, self.patterns[j], j))
+
+    def apply(self, vector: Sparse) -> Sparse:
+        """f(A) v for a sparse v, in as many products as its longest column needs if its columns share a form."""
+        columns = [self.patterns[j] for j in vector]
+        forms = {pattern.form for pattern in columns if pattern.form is not None}
+        if len(forms) > 1:
+            total: Sparse = {}
+            for j, value in vector.items():
+                for r, entry in self.column(j).items():
+                    total[r] = add(total.get(r, 0), product(entry, value))
+            return total
+        zeros = max((pattern.zeros for pattern in columns), default=1)
+        pairs = max((pattern.pairs for pattern in columns), default=0)
+        # A column without pairs is annihilated by its zeros alone, and so by any longer polynomial.
+        longest = ColumnPattern(zeros, pairs, next(iter(forms), None), ())
+        return self._sum(longest, _Krylov(self.family, longest, vector))
+
+    def _sum(self, pattern: ColumnPattern, krylov: _Krylov) -> Sparse:
         terms = self._terms(pattern)
-        krylov = _Krylov(self.family, pattern, j)
         result: Sparse = {}
         for (power, s), coefficient in terms:
             if is_zero(coefficient):
@@ -225,12 +242,12 @@ class FunctionOfMatrix:
         return result
 
     def _z(self, pattern: ColumnPattern) -> Scalar:
-        return 0 if pattern.form is None else self._at(pattern.form)[0]
+        return 0 if pattern.form is None else self._at(pattern.form, pattern)[0]
 
-    def _at(self, form: QuadraticForm) -> tuple[Scalar, Values]:
+    def _at(self, form: QuadraticForm, pattern: ColumnPattern) -> tuple[Scalar, Values]:
         if form not in self._values:
             z = self.family.form(form) if not self._vanishes(form) else 0
-            tails = sorted({t for p in self.patterns if p.form == form for t in _tails(p)})
+            tails = sorted(set(_tails(pattern)) | {t for p in self.patterns if p.form == form for t in _tails(p)})
             signed = not form.is_nonnegative
             self._values[form] = (z, self.function.at(self.ops, z, tails, signed=signed))
         return self._values[form]
@@ -248,7 +265,7 @@ class FunctionOfMatrix:
                 constant = int(value) if value.denominator == 1 else self.ops.constant(value)
                 terms.append(((2 * i + odd, 0), constant))
             if pattern.form is not None:
-                values = self._at(pattern.form)[1]
+                values = self._at(pattern.form, pattern)[1]
                 terms += [((2 * a + odd, s), values.tail((odd, a, s))) for s in range(pattern.pairs)]
         return terms
 
@@ -262,11 +279,11 @@ def _tails(pattern: ColumnPattern) -> list[Tail]:
 
 
 class _Krylov:
-    """A^power (A^2 + q)^s e_j, kept to the rows where it does not vanish identically."""
+    """A^power (A^2 + q)^s v from v = e_j or a sparse v; of e_j only the rows where it does not vanish identically."""
 
-    def __init__(self, family: LinearFamily, pattern: ColumnPattern, j: int) -> None:
+    def __init__(self, family: LinearFamily, pattern: ColumnPattern, start: int | Sparse) -> None:
         self.family = family
-        self.j = j
+        self.start = start
         self.supports = dict(pattern.supports)
         self._done: dict[tuple[int, int], dict[int, tuple[int, Scalar]]] = {}
 
@@ -281,15 +298,17 @@ class _Krylov:
         if s:
             higher = self._plain(self.vector(power + 2, s - 1, z))
             for r, value in self._plain(self.vector(power, s - 1, z)).items():
-                if r in (self.supports.get((power, s)) or ()):
+                rows = self.supports.get((power, s))
+                if rows is None or r in rows:
                     higher[r] = add(higher.get(r, 0), product(z, value))
             return {r: (1, value) for r, value in higher.items()}
         if power == 0:
-            return {self.j: (1, 1)}
-        if power == 1:
-            return self.family.first(self.j)
-        if power == 2:
-            return self.family.second(self.j)
+            start = {self.start: 1} if isinstance(self.start, int) else self.start
+            return {r: (1, value) for r, value in start.items()}
+        if isinstance(self.start, int) and power == 1:
+            return self.family.first(self.start)
+        if isinstance(self.start, int) and power == 2:
+            return self.family.second(self.start)
         applied = self.family.apply(self._plain(self.vector(power - 1, 0, z)))
         return {r: (1, value) for r, value in applied.items()}
 
