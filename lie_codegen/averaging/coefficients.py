@@ -190,13 +190,17 @@ def _convert(value: sp.Expr, ring: PolyRing, images: Mapping[sp.Expr, Any]) -> A
         power = (int(value.exp.p) - 1) // 2
         outside *= value.base**power
         start = ring.ground_new(QQ(int(outside.p), int(outside.q)))
-        return reduce(lambda a, root: a * images[root], roots, start)
+        return reduce(lambda a, root: a * _image(root, images), roots, start)
     if isinstance(value, sp.Add):
         return reduce(lambda a, b: a + b, (_convert(argument, ring, images) for argument in value.args))
     if isinstance(value, sp.Mul):
         return reduce(lambda a, b: a * b, (_convert(argument, ring, images) for argument in value.args))
     if isinstance(value, sp.Pow) and value.exp.is_Integer and value.exp > 0:
         return _convert(value.base, ring, images) ** int(value.exp)
-    if value not in images:
-        raise InputError(f"{value} is not in the ring of coefficients")
-    return images[value]
+    return _image(value, images)
+
+
+def _image(generator: sp.Expr, images: Mapping[sp.Expr, Any]) -> Any:
+    if generator not in images:
+        raise InputError(f"{generator} is not in the ring of coefficients")
+    return images[generator]
