@@ -26,7 +26,7 @@ from lie_codegen.algebra.quadratic_form import QuadraticForm
 _POINTS = 3
 _RANGE = 2**39
 _MOST_ZEROS = 4
-_MOST_PAIRS = 2
+_MOST_PAIRS = 3
 
 #: position -> exact field element
 _Vector = dict[int, Any]

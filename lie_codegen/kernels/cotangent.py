@@ -35,10 +35,10 @@ class CotangentFunctions:
         self.inner = ops.where(self.near, z, 0)
         self.outer = ops.where(self.near, SWITCH, z)
         self.signed = signed
-        self._outer_E: Scalar | None = None
+        self._outer: dict[tuple[int, int], Scalar] = {}
 
     def tail(self, a: int, order: int) -> Scalar:
-        """(1/order!) d^order/d mu^order of E[0, .., 0 (a times), mu], the a-th tail of E; order 0 or 1."""
+        """(1/order!) d^order/d mu^order of E[0, .., 0 (a times), mu], the a-th tail of E; order up to 2."""
         if is_zero(self.z):
             return self.ops.constant(taylor(a + order))
         if (a, order) not in self._done:
@@ -51,7 +51,7 @@ class CotangentFunctions:
         if a == 0:
             if order == 0:
                 return 1 + mu * self._near_tail(1, 0)
-            return self._near_tail(1, 0) + mu * self._near_tail(1, 1)
+            return self._near_tail(1, order - 1) + mu * self._near_tail(1, order)
         pole = ops.constant(four_pi_squared())
         # 2 / (pole + mu), shifted down a - 1 places and differentiated: the geometric series is its own tail.
         scale = Fraction(2) * (-1) ** (a - 1 + order) / four_pi_squared() ** (a - 1)
@@ -63,30 +63,34 @@ class CotangentFunctions:
         return fraction + series
 
     def _outer_tail(self, a: int, order: int) -> Scalar:
-        """E by the cotangent; tails by their definition; derivatives by 2 z dE/dz = E - E^2 - z/4."""
+        """E by the cotangent, its derivatives by 2 z dE/dmu = E^2 - E + z/4, tails T_a = (T_{a-1} - T_{a-1}(0)) / mu."""
+        if (a, order) not in self._outer:
+            self._outer[a, order] = self._compute_outer(a, order)
+        return self._outer[a, order]
+
+    def _compute_outer(self, a: int, order: int) -> Scalar:
         z = self.outer
+        if a and order:
+            return (self._outer_tail(a, order - 1) - self._outer_tail(a - 1, order)) / z
+        if a:
+            return (self.ops.constant(taylor(a - 1)) - self._outer_tail(a - 1, 0)) / z
         if order == 0:
-            if a == 0:
-                return self._outer_value()
-            previous = self._outer_tail(a - 1, 0)
-            return (self.ops.constant(taylor(a - 1)) - previous) / z
-        if a == 0:
-            E = self._outer_value()
-            return -(E - E * E - z / 4) / (2 * z)
-        return (self._outer_tail(a, 0) - self._outer_tail(a - 1, 1)) / z
+            return self._outer_value()
+        E = self._outer_tail(0, 0)
+        if order == 1:
+            return (E * E - E + z / 4) / (2 * z)
+        slope = self._outer_tail(0, 1)
+        return (((2 * E - 1) * slope - self.ops.constant(Fraction(1, 4))) / 2 + slope) / (2 * z)
 
     def _outer_value(self) -> Scalar:
-        if self._outer_E is None:
-            ops = self.ops
-            if not self.signed:
-                half = ops.sqrt(self.outer) / 2
-                self._outer_E = half * ops.cos(half) / ops.sin(half)
-            else:
-                negative = ops.less(self.outer, 0)
-                half = ops.sqrt(ops.where(negative, SWITCH, self.outer)) / 2
-                other = ops.sqrt(ops.where(negative, -self.outer, SWITCH)) / 2
-                self._outer_E = ops.where(negative, other / ops.tanh(other), half * ops.cos(half) / ops.sin(half))
-        return self._outer_E
+        ops = self.ops
+        if not self.signed:
+            half = ops.sqrt(self.outer) / 2
+            return half * ops.cos(half) / ops.sin(half)
+        negative = ops.less(self.outer, 0)
+        half = ops.sqrt(ops.where(negative, SWITCH, self.outer)) / 2
+        other = ops.sqrt(ops.where(negative, -self.outer, SWITCH)) / 2
+        return ops.where(negative, other / ops.tanh(other), half * ops.cos(half) / ops.sin(half))
 
 
 def _power(x: Scalar, exponent: int) -> Scalar:

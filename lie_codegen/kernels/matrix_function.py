@@ -113,9 +113,6 @@ RIGHT_JACOBIAN = ExponentialFunction(1, -1)
 LEFT_JACOBIAN_INVERSE = BernoulliFunction()
 RIGHT_JACOBIAN_INVERSE = BernoulliFunction(-1)
 
-#: What the formulas for the inverse Jacobian reach: simple and double eigenvalues.
-MOST_PAIRS = 2
-
 Sparse = dict[int, Scalar]
 
 
