@@ -100,7 +100,7 @@ def _coordinate_map(
 ) -> tuple[list[int], list[list[Number]]]:
     """Positions that determine the coordinates, and the inverse of the basis restricted to them."""
     basis = domain_matrix(columns)
-    reduced, pivots = basis.rref()
+    _, pivots = basis.rref()
     if len(pivots) < len(labels):
         relation = to_numbers(domain_matrix(list(zip(*columns, strict=True))).nullspace().to_dense())[0]
         text = " + ".join(f"({value}) {label}" for value, label in zip(relation, labels, strict=True) if value != 0)
@@ -136,5 +136,3 @@ def permutation(algebra: LieAlgebra, labels: Sequence[str]) -> list[int]:
             f"{algebra.name}: {tuple(labels)} is not a reordering of its labels {algebra.labels}; name each once"
         )
     return [algebra.labels.index(label) for label in labels]
-
-

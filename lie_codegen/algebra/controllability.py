@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import sympy as sp
 
 from lie_codegen.algebra.exact import Number, domain_matrix
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.algebra.lyndon import BracketWord, Word, bracket_word, lyndon_words, standard_factorization
 from lie_codegen.errors import InputError, UncontrollableError
 
 
@@ -23,6 +25,8 @@ class Controllability:
         controllable: whether the span is the whole algebra.
         missing: labels of basis elements outside the span (a complement), empty if controllable.
         reason: one sentence.
+        words: for each layer the brackets that fill it: words[k] are brackets of k + 1 controls (Lyndon basis) that, with
+            those before them, are independent and span all brackets of that length or less.
     """
 
     controls: tuple[int, ...]
@@ -31,6 +35,7 @@ class Controllability:
     controllable: bool
     missing: tuple[str, ...]
     reason: str
+    words: tuple[tuple[BracketWord, ...], ...]
 
 
 def control_indices(algebra: LieAlgebra, controls: Sequence[str | int]) -> tuple[int, ...]:
@@ -54,15 +59,10 @@ def controllability(algebra: LieAlgebra, controls: Sequence[str | int]) -> Contr
     controls is the algebra (Chow; Jurdjevic and Sussmann); Leonard and Krishnaprasad, TR 93-59, section 2.
     """
     indices = control_indices(algebra, controls)
-    generators: list[dict[int, Number]] = [{i: sp.S.One} for i in indices]
-    span = list(generators)
-    layer = list(generators)
-    growth = [len(span)]
-    while len(span) < algebra.dim:
-        layer, span = _next_layer(algebra, generators, layer, span)
-        if len(span) == growth[-1]:
-            break
-        growth.append(len(span))
+    layers = _Layers(algebra, indices)
+    while layers.grow():
+        pass
+    growth, span = layers.growth, layers.span
     missing = _complement(algebra, span)
     complete = not missing
     names = ", ".join(algebra.labels[i] for i in indices)
@@ -73,7 +73,7 @@ def controllability(algebra: LieAlgebra, controls: Sequence[str | int]) -> Contr
         else f"the brackets of {names} fill only {growth[-1]} of {algebra.dim} dimensions of {algebra.name}: growth "
         f"vector {vector}; out of reach: {', '.join(missing)}"
     )
-    return Controllability(indices, tuple(growth), len(growth) - 1, complete, missing, reason)
+    return Controllability(indices, growth, len(growth) - 1, complete, missing, reason, layers.words)
 
 
 def require_controllable(algebra: LieAlgebra, controls: Sequence[str | int]) -> Controllability:
@@ -88,20 +88,57 @@ def require_controllable(algebra: LieAlgebra, controls: Sequence[str | int]) -> 
     return report
 
 
-def _next_layer(
-    algebra: LieAlgebra,
-    generators: list[dict[int, Number]],
-    layer: list[dict[int, Number]],
-    span: list[dict[int, Number]],
-) -> tuple[list[dict[int, Number]], list[dict[int, Number]]]:
-    """Brackets of the generators with the last layer that enlarge the span."""
-    new: list[dict[int, Number]] = []
-    for generator in generators:
-        for element in layer:
-            candidate = algebra.bracket(generator, element)
-            if candidate and _rank(algebra, [*span, *new, candidate]) > len(span) + len(new):
-                new.append(candidate)
-    return new, [*span, *new]
+class _Layers:
+    """The span of brackets of the controls, grown by their length."""
+
+    def __init__(self, algebra: LieAlgebra, indices: tuple[int, ...]) -> None:
+        self.algebra = algebra
+        self.labels = tuple(algebra.labels[i] for i in indices)
+        self.values: dict[Word, dict[int, Number]] = {(k,): {i: sp.S.One} for k, i in enumerate(indices)}
+        self.span = list(self.values.values())
+        self.found: list[tuple[Word, ...]] = [tuple(self.values)]
+
+    @property
+    def growth(self) -> tuple[int, ...]:
+        """Dimension of the span after each layer."""
+        return tuple(accumulate(map(len, self.found)))
+
+    @property
+    def words(self) -> tuple[tuple[BracketWord, ...], ...]:
+        """The brackets of each layer, as they are written."""
+        return tuple(tuple(bracket_word(word, self.labels) for word in layer) for layer in self.found)
+
+    def grow(self) -> bool:
+        """Adds the next layer; False, and nothing added, when the span has stopped growing."""
+        target = self._next_dimension()
+        if target == len(self.span):
+            return False
+        new: list[Word] = []
+        length = len(self.found) + 1
+        for word in lyndon_words(len(self.labels), length):
+            value = self._value(word)
+            if value and _rank(self.algebra, [*self.span, value]) > len(self.span):
+                self.span.append(value)
+                new.append(word)
+            if len(self.span) == target:
+                break
+        self.found.append(tuple(new))
+        return True
+
+    def _next_dimension(self) -> int:
+        """Dimension of the span of the span and its brackets with the controls."""
+        if len(self.span) == self.algebra.dim:
+            return self.algebra.dim
+        controls = [self.values[k,] for k in range(len(self.labels))]
+        last = [self.values[word] for word in self.found[-1]]
+        images = [self.algebra.bracket(control, element) for control in controls for element in last]
+        return _rank(self.algebra, [*self.span, *(image for image in images if image)])
+
+    def _value(self, word: Word) -> dict[int, Number]:
+        if word not in self.values:
+            left, right = (self._value(part) for part in standard_factorization(word))
+            self.values[word] = self.algebra.bracket(left, right) if left and right else {}
+        return self.values[word]
 
 
 def _rank(algebra: LieAlgebra, vectors: list[dict[int, Number]]) -> int:
