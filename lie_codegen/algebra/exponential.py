@@ -121,12 +121,23 @@ def _modes(coefficients: list[Number]) -> tuple[Mode, ...]:
 
 
 def _roots(factor: sp.Poly) -> list[Number]:
-    """The roots of an irreducible factor, in radicals where there are some, else to 40 digits."""
-    if factor.degree() <= 2 or all(power % 2 == 0 for (power,) in factor.monoms()):
-        found = sp.roots(factor.as_expr(), *factor.gens)
-        if sum(found.values()) == factor.degree():
-            return [sp.sqrtdenest(sp.simplify(root)) for root in found]
+    """The roots of an irreducible factor, in square roots where there are some, else to 40 digits."""
+    coefficients = [value / factor.LC() for value in factor.all_coeffs()]
+    if len(coefficients) == 2:
+        return [sp.expand(-coefficients[1])]
+    if len(coefficients) == 3:
+        return _quadratic_roots(coefficients[1], coefficients[2])
+    if len(coefficients) == 5 and coefficients[1] == 0 == coefficients[3]:
+        squares = _quadratic_roots(coefficients[2], coefficients[4])
+        if all(square.is_real for square in squares):
+            return [sign * sp.sqrtdenest(sp.sqrt(square)) for square in squares for sign in (1, -1)]
     return [_rounded(root) for root in factor.nroots(n=40, maxsteps=200)]
+
+
+def _quadratic_roots(p: Number, q: Number) -> list[Number]:
+    """The roots of x^2 + p x + q."""
+    root = sp.sqrt(sp.expand(p * p / 4 - q))
+    return [sp.expand(-p / 2 + root), sp.expand(-p / 2 - root)]
 
 
 def _rounded(root: Number) -> Number:

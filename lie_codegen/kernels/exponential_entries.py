@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import operator
-from functools import reduce
+from collections.abc import Callable
+from functools import partial, reduce
 from typing import Any
 
 from lie_codegen.algebra.exact import Number
@@ -13,13 +14,16 @@ from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 #: |x| * (largest eigenvalue) below which an entry that cancels is summed as its Taylor series.
 _SWITCH = 1.0
 
+#: order of the zero at x = 0, coefficient, value
+_Piece = tuple[int, Number, Callable[[], Scalar]]
+
 
 class ExponentialEntries:
     """exp(x A) for one scalar x; modes are computed once and shared between entries.
 
     An entry that vanishes at x = 0 while the modes it combines do not would lose its digits there. The common cases
-    have closed forms without cancellation: 1 - cos bx = 2 sin^2(bx/2), e^{ax} - 1 = expm1(ax), sinh and cosh; any other is
-    summed as its Taylor series for small x.
+    have closed forms without cancellation: 1 - cos bx = 2 sin^2(bx/2), e^{ax} - 1 = expm1(ax), sinh, cosh - 1; any other
+    (x - sin bx, say) is summed as its Taylor series for small x.
     """
 
     def __init__(self, ops: Arithmetic, x: Scalar, data: MatrixExponential, *, printed: bool = False) -> None:
@@ -49,44 +53,64 @@ class ExponentialEntries:
         return value
 
     def _compute(self, terms: dict[int, Number], taylor: tuple[Number, ...]) -> Scalar:
-        if self.printed or not self._cancels(terms, taylor):
+        if self.printed or len(terms) < 2:
             return self._sum(terms)
-        closed = self._without_cancellation(terms)
-        if closed is not None:
-            return closed
+        leading = next(order for order, value in enumerate(taylor) if value != 0)
+        if all(_order_at_zero(self.data.modes[m]) >= leading for m in terms):
+            return self._sum(terms)
+        pieces = self._vanishing(terms)
+        if all(order >= leading for order, _, _ in pieces):
+            return reduce(operator.add, (_times(self.ops, factor, value()) for _, factor, value in pieces))
         scale = _SWITCH / self.data.radius
         near = self.ops.less(self.x * self.x, scale * scale)
         return self.ops.where(near, self._series(taylor), self._sum(terms))
 
-    def _cancels(self, terms: dict[int, Number], taylor: tuple[Number, ...]) -> bool:
-        if len(terms) < 2:
-            return False
-        leading = next(order for order, value in enumerate(taylor) if value != 0)
-        return any(_order_at_zero(self.data.modes[m]) < leading for m in terms)
+    def _vanishing(self, terms: dict[int, Number]) -> list[_Piece]:
+        """The entry, zero at x = 0, as a sum of functions that vanish there: (order, coefficient, value).
 
-    def _without_cancellation(self, terms: dict[int, Number]) -> Scalar | None:
-        """c (cos bx - 1), c (e^{ax} - 1) and c (e^{ax} - e^{-ax})."""
-        if len(terms) != 2:
-            return None
-        (first, a), (second, b) = terms.items()
-        modes = self.data.modes
-        if a != -b or modes[first].power or modes[second].power:
-            return None
-        if _is_one(modes[first]):
-            return self._minus_one(modes[second], b)
-        if _is_one(modes[second]):
-            return self._minus_one(modes[first], a)
-        if modes[first].rate == -modes[second].rate and modes[first].frequency == 0 == modes[second].frequency:
-            return _times(self.ops, 2 * b, self.ops.sinh(_times(self.ops, modes[second].rate, self.x)))
-        return None
+        Its even modes of power 0 add up to 0 at x = 0, so each may lose the constant 1; e^{ax} - 1 and e^{-ax} - 1 become
+        sinh ax and cosh ax - 1.
+        """
+        pieces: list[_Piece] = []
+        growth: dict[Number, Number] = {}
+        for m, coefficient in terms.items():
+            mode = self.data.modes[m]
+            if mode.power or mode.odd:
+                pieces.append((_order_at_zero(mode), coefficient, partial(self._mode, m)))
+            elif mode.frequency == 0:
+                if mode.rate != 0:
+                    growth[mode.rate] = coefficient
+            elif mode.rate == 0:
+                pieces.append((2, -2 * coefficient, partial(self._square, "sin", mode.frequency / 2)))
+            else:
+                pieces.append((1, coefficient, partial(self._spiral, m)))
+        for rate, coefficient in growth.items():
+            opposite = growth.get(-rate)
+            if opposite is None:
+                pieces.append((1, coefficient, partial(self._function, "expm1", rate)))
+            elif rate > 0:
+                if coefficient != opposite:
+                    pieces.append((1, coefficient - opposite, partial(self._function, "sinh", rate)))
+                if coefficient != -opposite:
+                    pieces.append((2, 2 * (coefficient + opposite), partial(self._square, "sinh", rate / 2)))
+        return pieces
 
-    def _minus_one(self, mode: Mode, coefficient: Number) -> Scalar | None:
-        if mode.odd or (mode.rate != 0 and mode.frequency != 0):
-            return None
-        if mode.frequency != 0:
-            half = self.ops.sin(_times(self.ops, mode.frequency / 2, self.x))
-            return _times(self.ops, -2 * coefficient, half * half)
-        return _times(self.ops, coefficient, self.ops.expm1(_times(self.ops, mode.rate, self.x)))
+    def _function(self, name: str, rate: Number) -> Scalar:
+        """One function of rate x, computed once."""
+        key = (name, rate)
+        if key not in self._cache:
+            self._cache[key] = getattr(self.ops, name)(_times(self.ops, rate, self.x))
+        return self._cache[key]
+
+    def _square(self, name: str, rate: Number) -> Scalar:
+        value = self._function(name, rate)
+        return value * value
+
+    def _spiral(self, m: int) -> Scalar:
+        """e^{ax} cos bx - 1."""
+        mode = self.data.modes[m]
+        cosine = self._function("cos", mode.frequency)
+        return self._function("expm1", mode.rate) * cosine - 2 * self._square("sin", mode.frequency / 2)
 
     def _sum(self, terms: dict[int, Number]) -> Scalar:
         total: Any = None
@@ -118,10 +142,6 @@ class ExponentialEntries:
 
 def _order_at_zero(mode: Mode) -> int:
     return mode.power + (1 if mode.odd else 0)
-
-
-def _is_one(mode: Mode) -> bool:
-    return mode.power == 0 and mode.rate == 0 and mode.frequency == 0
 
 
 def _times(ops: Arithmetic, coefficient: Number, value: Scalar) -> Scalar:
