@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.codegen.opcodes import C99_FORMS, Target, c_literal
+from lie_codegen.codegen.steering_defaults import Defaults
 from lie_codegen.codegen.tape import Tape, tape_of
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.views import StatementView, comment_lines, kernel_view
@@ -48,26 +49,6 @@ class LaneKernel:
 
 
 @dataclass(frozen=True)
-class Defaults:
-    """Options of the solver, as tuned by the studies for the size of the problem."""
-
-    starts: int
-    search_steps: int
-    search_iterations: int
-    polish_steps: int = 32
-    polish_iterations: int = 40
-
-    @staticmethod
-    def of(group: MatrixGroup, depth: int) -> Defaults:
-        """More starts where more extremals compete: in higher dimension and for deeper brackets."""
-        if group.dim <= 3:
-            return Defaults(16, 16, 16)
-        if group.dim <= 6 and depth <= 1:
-            return Defaults(64, 16, 24)
-        return Defaults(128, 20, 32)
-
-
-@dataclass(frozen=True)
 class SteeringView:
     """What the templates see."""
 
@@ -88,16 +69,11 @@ class SteeringView:
     cosines: tuple[str, ...]
     quiet_rounds: int
     kernels: tuple[LaneKernel, ...]
-    starts: int
-    search_steps: int
-    search_iterations: int
-    polish_steps: int
-    polish_iterations: int
+    defaults: Defaults
 
 
 def steering_view(group: MatrixGroup, controls: tuple[int, ...], depth: int) -> SteeringView:
     """The view of the solver of one group and its controls (positions); depth as `Controllability.depth`."""
-    defaults = Defaults.of(group, depth)
     pairs, areas = loop_areas(group, controls)
     positions = varying_entries(group)
     d, parts = group.degree, 2 if group.is_complex else 1
@@ -117,13 +93,9 @@ def steering_view(group: MatrixGroup, controls: tuple[int, ...], depth: int) -> 
         second=tuple(b for _, b in pairs),
         areas=tuple(tuple(c_literal(float(value)) for value in row) for row in areas),
         cosines=tuple(c_literal(math.cos(math.pi * k / _SEED_STEPS)) for k in range(2 * _SEED_STEPS)),
-        quiet_rounds=2 if depth <= 1 else 0,
+        quiet_rounds=1 if depth <= 1 else 0,
         kernels=tuple(_lane_kernel(kernel) for kernel in shooting_kernels(group, controls)),
-        starts=defaults.starts,
-        search_steps=defaults.search_steps,
-        search_iterations=defaults.search_iterations,
-        polish_steps=defaults.polish_steps,
-        polish_iterations=defaults.polish_iterations,
+        defaults=Defaults.of(group.dim, depth),
     )
 
 

@@ -41,6 +41,17 @@ def distance(group: MatrixGroup, X: ArrayLike, Y: ArrayLike) -> float:
     return float(np.linalg.norm(relative - np.eye(group.degree)))
 
 
+def element_coordinates(group: MatrixGroup, X: ArrayLike) -> Array:
+    """(n,) the logarithm of X where it has one, else its coordinates of the second kind, else 0: a first guess."""
+    x, off = matrix_log(group, X)
+    if off <= 1e-6:
+        return x
+    try:
+        return second_kind(group, X)
+    except NotOnGroupError:
+        return np.zeros(group.dim)
+
+
 def second_kind(group: MatrixGroup, X: ArrayLike) -> Array:
     """g with exp(g_1 A_1) ... exp(g_n A_n) = X, the one nearest to 0 that Newton's method finds.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ def energy(u: Controls, duration: float) -> float:
     inner = u.breakpoints[(u.breakpoints > 0) & (u.breakpoints < duration)]
     knots = np.unique(np.concatenate([[0.0], inner, [duration]]))
     parts = max(1, -(-_PANELS // (len(knots) - 1)))
-    edges = np.concatenate([np.linspace(a, b, parts, endpoint=False) for a, b in zip(knots, knots[1:], strict=False)])
+    edges = np.concatenate([np.linspace(a, b, parts, endpoint=False) for a, b in pairwise(knots)])
     widths = np.diff(np.append(edges, duration))
     t = edges[:, None] + widths[:, None] * (1 + _NODES) / 2
     values = np.sum(u(t.ravel()) ** 2, axis=1).reshape(t.shape)

@@ -68,7 +68,7 @@ def average(plan: Plan, t: Array) -> Array:
     Theorem 3 and Corollary 2 of the paper, interval by interval.
     """
     info = plan.details
-    i, j, k, constant = _bracket_of(plan)
+    i, j, k, _ = _bracket_of(plan)
     t1, t2 = info["switches"][0], info["switches"][1]
     g = np.zeros((len(t), plan.group.dim))
     g[:, [i, j]] = integrals(plan, t)

@@ -1,0 +1,220 @@
+"""The extremals of minimum-energy steering, piece by piece, as the kernels that the shooting solver loops over.
+
+    minimise 1/2 int_0^1 sum_i w_i u_i^2 dt   subject to   X' = X sum_i u_i A_i,  X(0) = I,  X(1) = target
+
+Pontryagin: u_i = <mu, A_i> / w_i, mu' = ad*_u mu, that is mu'_j = sum_i u_i c[i, j, k] mu_k (Lie-Poisson). With
+Psi = d mu / d mu(0) and Xi = vee(X^-1 dX / d mu(0)), column by column,
+    psi'_j = sum_i (du_i c[i, j, k] mu_k + u_i c[i, j, k] psi_k),   xi' = du + [xi, u],   du_i = psi_i / w_i.
+Everything is a polynomial, so that the same text runs on one double or on a vector of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernels.block_solve import add
+from lie_codegen.kernels.complex_scalar import Complex
+from lie_codegen.kernels.element_pattern import pack, packed_size, unpack
+from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernels.rkmk import bracket_body, hat_body, sum_products, times_taylor_exp
+
+#: Taylor degree of the exponential in the seed's logarithm, for |theta| below 1.
+SEED_EXPONENTIAL_DEGREE = 8
+
+
+def shooting_kernels(group: MatrixGroup, controls: tuple[int, ...]) -> tuple[Kernel, ...]:
+    """All that the shooting solver needs to know about a group; elements of the group are packed."""
+    return (
+        transport(group, controls),
+        coadjoint(group, controls),
+        sensitivity_column(group, controls),
+        endpoint(group),
+        advance(group),
+        offset(group),
+        correction(group),
+    )
+
+
+def transport(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u, mu, X) -> (ad*_u mu, X hat(u)): bilinear in u and (mu, X)."""
+
+    def body(ops: Arithmetic, u: Any, mu: Any, X: Any) -> tuple[Any, ...]:
+        return _coadjoint(group, controls, ops, u, mu), _moving(group, controls, ops, u, X)
+
+    return Kernel(
+        "transport",
+        group.name,
+        (Port("u", (len(controls),)), Port("mu", (group.dim,)), Port("X", (packed_size(group),))),
+        (Port("mu_rate", (group.dim,)), Port("X_rate", (packed_size(group),))),
+        body,
+        formula="mu' = ad*_u mu, X' = X hat(u)",
+    )
+
+
+def coadjoint(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u, mu) -> ad*_u mu, for controls that are given."""
+    return Kernel(
+        "coadjoint",
+        group.name,
+        (Port("u", (len(controls),)), Port("mu", (group.dim,))),
+        (Port("mu_rate", (group.dim,)),),
+        lambda ops, u, mu: (_coadjoint(group, controls, ops, u, mu),),
+        formula="mu'_j = sum_i u_i c[i, j, k] mu_k",
+    )
+
+
+def sensitivity_column(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u, mu, du, psi, xi) -> (psi', xi'): one column of the variational equations."""
+    n, m = group.dim, len(controls)
+
+    def body(ops: Arithmetic, u: Any, mu: Any, du: Any, psi: Any, xi: Any) -> tuple[Any, ...]:
+        forced = _coadjoint(group, controls, ops, du, mu)
+        psi_rate = [add(a, b) for a, b in zip(forced, _coadjoint(group, controls, ops, u, psi), strict=True)]
+        xi_rate = bracket_body(group, ops, xi, _spread(group, controls, u))
+        for value, position in zip(du, controls, strict=True):
+            xi_rate[position] = add(value, xi_rate[position])
+        return psi_rate, xi_rate
+
+    return Kernel(
+        "sensitivity",
+        group.name,
+        (Port("u", (m,)), Port("mu", (n,)), Port("du", (m,)), Port("psi", (n,)), Port("xi", (n,))),
+        (Port("psi_rate", (n,)), Port("xi_rate", (n,))),
+        body,
+        formula="psi' = ad*_du mu + ad*_u psi, xi' = du + [xi, u]",
+    )
+
+
+def endpoint(group: MatrixGroup) -> Kernel:
+    """(target, X) -> (F, q, G) with r = X - target: F = |r|^2, q_k = <X A_k, r>, G_kl = <X A_k, X A_l>.
+
+    What Gauss-Newton needs, in the entries' Euclidean metric. F vanishes at the target alone (on SO(3) the skew part of
+    target^-1 X also vanishes at half a turn from it), and no inverse is taken.
+    """
+    n, size = group.dim, packed_size(group)
+
+    def body(ops: Arithmetic, target: Any, X: Any) -> tuple[Any, ...]:
+        r = [x - goal for x, goal in zip(X, target, strict=True)]
+        matrix = unpack(group, X)
+        moves = []
+        for k in range(n):
+            unit = [1 if j == k else 0 for j in range(n)]
+            moves.append(pack(group, _matmul(matrix, hat_body(group, ops, unit))))
+        q = [sum_products(zip(move, r, strict=True)) for move in moves]
+        G = [[sum_products(zip(moves[max(k, j)], moves[min(k, j)], strict=True)) for j in range(n)] for k in range(n)]
+        return sum_products(zip(r, r, strict=True)), q, G
+
+    return Kernel(
+        "endpoint",
+        group.name,
+        (Port("target", (size,)), Port("X", (size,))),
+        (Port("F", ()), Port("q", (n,)), Port("G", (n, n))),
+        body,
+        formula="r = X - target, F = |r|^2, q_k = <X A_k, r>, G_kl = <X A_k, X A_l>",
+    )
+
+
+def advance(group: MatrixGroup) -> Kernel:
+    """(X, theta) -> X exp(hat(theta)) by a Taylor polynomial, for small theta."""
+    size = packed_size(group)
+
+    def body(ops: Arithmetic, X: Any, theta: Any) -> tuple[Any, ...]:
+        return (pack(group, times_taylor_exp(group, ops, unpack(group, X), theta, SEED_EXPONENTIAL_DEGREE)),)
+
+    return Kernel(
+        "advance",
+        group.name,
+        (Port("X", (size,)), Port("theta", (group.dim,))),
+        (Port("X_next", (size,)),),
+        body,
+        formula="X_next = X exp(hat(theta)), Taylor",
+    )
+
+
+def offset(group: MatrixGroup) -> Kernel:
+    """X -> coordinates of X - I, projected on the algebra (Frobenius)."""
+    d = group.degree
+    weights = group.coordinate_rows
+
+    def body(ops: Arithmetic, X: Any) -> tuple[Any, ...]:
+        matrix = unpack(group, X)
+        entries = [Complex.of(_minus(matrix[i][j], 1 if i == j else 0)) for i in range(d) for j in range(d)]
+        parts = [entry.re for entry in entries] + [entry.im for entry in entries]
+        rows = [
+            [(ops.constant(float(w)), p) for w, p in zip(row, parts, strict=True) if abs(w) > 1e-14] for row in weights
+        ]
+        return ([sum_products(row) for row in rows],)
+
+    return Kernel(
+        "offset",
+        group.name,
+        (Port("X", (packed_size(group),)),),
+        (Port("x", (group.dim,)),),
+        body,
+        formula="x = vee of the projection of X - I on the algebra",
+    )
+
+
+def correction(group: MatrixGroup) -> Kernel:
+    """(x, y) -> z with exp(x) exp(y) = exp(z) to first order in y: z = x + y + [x, y] / 2 + [x, [x, y]] / 12."""
+    n = group.dim
+
+    def body(ops: Arithmetic, x: Any, y: Any) -> tuple[Any, ...]:
+        first = bracket_body(group, ops, x, y)
+        second = bracket_body(group, ops, x, first)
+        return ([a + b + c / 2 + e / 12 for a, b, c, e in zip(x, y, first, second, strict=True)],)
+
+    return Kernel(
+        "correction",
+        group.name,
+        (Port("x", (n,)), Port("y", (n,))),
+        (Port("z", (n,)),),
+        body,
+        formula="z = x + y + [x, y] / 2 + [x, [x, y]] / 12",
+    )
+
+
+def _coadjoint(
+    group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, u: Sequence[Scalar], mu: Sequence[Scalar]
+) -> list[Scalar]:
+    position = {basis: number for number, basis in enumerate(controls)}
+    result: list[Scalar] = [0] * group.dim
+    for (i, j), row in group.algebra.table.items():
+        pairing = sum_products(
+            (ops.constant(value) if abs(value) != 1 else int(value), mu[k]) for k, value in row.items()
+        )
+        if i in position:
+            result[j] = add(result[j], u[position[i]] * pairing)
+        if j in position:
+            result[i] = add(result[i], -(u[position[j]] * pairing))
+    return result
+
+
+def _moving(group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, u: Sequence[Scalar], X: Any) -> list[Any]:
+    return pack(group, _matmul(unpack(group, X), hat_body(group, ops, _spread(group, controls, u))))
+
+
+def _spread(group: MatrixGroup, controls: tuple[int, ...], u: Sequence[Scalar]) -> list[Scalar]:
+    full: list[Scalar] = [0] * group.dim
+    for value, position in zip(u, controls, strict=True):
+        full[position] = value
+    return full
+
+
+def _matmul(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
+    size = len(a)
+    return [
+        [sum_products((a[i][m], b[m][j]) for m in range(size) if not _plain_zero(b[m][j])) for j in range(size)]
+        for i in range(size)
+    ]
+
+
+def _plain_zero(value: Any) -> bool:
+    return isinstance(value, int) and value == 0
+
+
+def _minus(value: Any, number: int) -> Any:
+    return value - number if number else value

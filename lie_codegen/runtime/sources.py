@@ -1,0 +1,99 @@
+"""C text that is not made of kernels -> a shared library, through the same cache and the same ladder of compilers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from lie_codegen.errors import CompileError
+from lie_codegen.runtime import cache
+from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
+from lie_codegen.runtime.cache_upkeep import evict
+from lie_codegen.runtime.compiler import Compiler, compile_library, find_compilers, is_working, warn_no_compiler
+from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
+
+#: Multiplications and additions may fuse here: an iterative solver has no bits to reproduce.
+SOLVER_FLAGS = ("-O2", "-march=native", "-std=c99", "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
+
+
+def build_source(
+    make_files: Callable[[], Mapping[str, str]], main: str, *, namespace: str, definition: str
+) -> Path | None:
+    """The shared library of some C files, from the cache where it is there; None where there is no compiler.
+
+    Args:
+        make_files: makes {flat file name: text}; not called when the answer is in the cache.
+        main: the file to compile.
+        namespace: C identifier, the stem of the library's file name.
+        definition: text that, with the source of this package, determines the files.
+
+    Raises:
+        CompileError: a compiler that works refuses the text.
+        CacheError: there is no folder to build in.
+    """
+    compilers = find_compilers()
+    if not compilers:
+        warn_no_compiler()
+        return None
+    folder = usable_folder()
+    for compiler in compilers:
+        entry = cache.find_entry(folder, _key(compiler, namespace, definition))
+        if entry is not None:
+            return entry.library
+    files = make_files()
+    try:
+        return _compile(folder, files, main, namespace, definition, compilers)
+    except OSError as error:
+        reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
+        return _compile(temporary_folder(reason), files, main, namespace, definition, compilers)
+
+
+def _key(compiler: Compiler, namespace: str, definition: str) -> str:
+    return digest(
+        {
+            "source": namespace,
+            "definition": definition,
+            "package": package_digest(),
+            "templates": templates_digest(),
+            "versions": versions(),
+            "flags": SOLVER_FLAGS,
+            "compiler": compiler.identity,
+            "cpu": cpu_identity(),
+        }
+    )
+
+
+def _compile(
+    folder: Path,
+    files: Mapping[str, str],
+    main: str,
+    namespace: str,
+    definition: str,
+    compilers: tuple[Compiler, ...],
+) -> Path:
+    failure: CompileError | None = None
+    for compiler in compilers:
+        key = _key(compiler, namespace, definition)
+        try:
+            with cache.lock(folder, key):
+                entry = cache.find_entry(folder, key) or _fill(folder, key, files, main, namespace, compiler)
+        except CompileError as error:
+            with cache.scratch(folder) as probe:
+                if is_working(compiler, probe):
+                    raise
+            failure = failure or error
+            continue
+        evict(folder, keep=key)
+        return entry.library
+    raise failure or CompileError("no compiler to try")
+
+
+def _fill(
+    folder: Path, key: str, files: Mapping[str, str], main: str, namespace: str, compiler: Compiler
+) -> cache.Entry:
+    with cache.scratch(folder) as home:
+        for name, text in files.items():
+            (home / name).write_bytes(text.encode())
+        output = f"{namespace}.so"
+        compile_library(compiler, home, main, output, SOLVER_FLAGS)
+        return cache.store_entry(folder, key, home / output, namespace, ())
