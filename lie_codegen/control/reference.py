@@ -1,0 +1,105 @@
+"""Reference trajectories as data: formulas of t, or waypoints to pass through. Velocities are derived, never asked for.
+
+    formulas   X_d(t) = X_0 exp(g_1(t) A_1) ... exp(g_n(t) A_n);  xi_d = M(g)^{-1} g', xi_d' its exact derivative
+    waypoints  X_d(t) = X_i exp(hat(p_i(s))),  s = (t - t_i)/(t_{i+1} - t_i), p_i a quintic of the algebra
+
+Both are twice continuously differentiable, as Theorem 4.2 asks (Bullo and Murray, CIT-CDS 97-003).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.errors import InputError
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+TIME = sp.Symbol("t", real=True)
+
+
+@dataclass(frozen=True)
+class FormulaReference:
+    """X_d(t) = X_0 exp(g_1(t) A_1) ... exp(g_n(t) A_n).
+
+    Attributes:
+        group: the group.
+        g: (n) expressions of `TIME`.
+        start: (d, d) X_0 as doubles; the identity if None.
+    """
+
+    group: MatrixGroup
+    g: tuple[sp.Expr, ...]
+    start: NDArray[Any] | None = None
+
+    @cached_property
+    def rates(self) -> tuple[sp.Expr, ...]:
+        """(n) g'."""
+        return tuple(sp.diff(entry, TIME) for entry in self.g)
+
+    @cached_property
+    def accelerations(self) -> tuple[sp.Expr, ...]:
+        """(n) g''."""
+        return tuple(sp.diff(entry, TIME) for entry in self.rates)
+
+
+@dataclass(frozen=True)
+class WaypointReference:
+    """Quintic segments of the algebra from waypoint to waypoint; at rest before the first and after the last.
+
+    Attributes:
+        group: the group.
+        times: (k,) increasing [s].
+        elements: (k, d, d) waypoints.
+        coefficients: (k - 1, 6, n) of p_i(s) = sum_m c_m s^m.
+    """
+
+    group: MatrixGroup
+    times: NDArray[Any]
+    elements: NDArray[Any]
+    coefficients: NDArray[Any]
+
+
+Reference = FormulaReference | WaypointReference
+
+
+def formula_reference(group: MatrixGroup, coordinates: Sequence[Any], *, start: Any = None) -> FormulaReference:
+    """A reference from formulas of t, one for each coordinate of the second kind.
+
+    Args:
+        group: the group.
+        coordinates: (n,) texts such as "0.3*sin(2*t)", or SymPy expressions of `TIME`.
+        start: (d, d) element on the left, the identity if not given.
+
+    Raises:
+        InputError: not n formulas, a symbol other than t, or abs, whose velocity jumps.
+        ExpressionError: a text outside the grammar, with the column.
+    """
+    if isinstance(coordinates, str) or len(coordinates) != group.dim:
+        raise InputError(f"a reference on {group.name} needs {group.dim} formulas, for {', '.join(group.labels)}")
+    return FormulaReference(
+        group, tuple(_formula(entry) for entry in coordinates), None if start is None else np.array(start)
+    )
+
+
+def _formula(entry: Any) -> sp.Expr:
+    if isinstance(entry, str):
+        formula = parse_expression(entry, {"t": TIME, "pi": sp.pi}, FORMULA_FUNCTIONS)
+        if formula.has(sp.Abs):
+            raise InputError(f"{entry!r} has a kink, where its velocity jumps; a smooth stand-in is sqrt(x^2 + 0.01)")
+        return formula
+    if isinstance(entry, float):
+        return sp.Rational(repr(entry))
+    value = sp.S(entry)
+    value = value.subs({symbol: TIME for symbol in value.free_symbols if symbol.name == "t"})
+    if value.free_symbols - {TIME}:
+        raise InputError(
+            f"{entry} holds {', '.join(map(str, value.free_symbols - {TIME}))}; a reference is a formula of t"
+        )
+    return value

@@ -1,0 +1,148 @@
+"""One step of a mechanical system on a group: X' = X hat(xi), I xi' = ad*_xi I xi + f(t, X, xi), to fourth order.
+
+The state is the varying entries of X followed by xi, and by controller states if there are any, as one vector, so that
+`scan` and `batch` take it. The group part is Runge-Kutta-Munthe-Kaas: four stages in the algebra, X exp(Theta) at
+the end, on the group to rounding for |h xi| <= 1/4. Munthe-Kaas, BIT 38 (1998) 92.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.control.positive_matrix import positive_matrix
+from lie_codegen.control.reference import Reference
+from lie_codegen.errors import InputError
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernels.element_pattern import pack, packed_size, unpack
+from lie_codegen.kernels.group_matrices import random_element
+from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernels.linear import Vector, bracket, plus, scaled
+from lie_codegen.kernels.mechanics_kernels import acceleration_body
+from lie_codegen.kernels.reference_kernels import ReferenceBody
+from lie_codegen.kernels.rkmk import times_taylor_exp
+from lie_codegen.kernels.wei_norman_body import WeiNormanData
+
+#: (ops, t, X, xi) -> (n,) body force.
+ForceBody = Callable[[Arithmetic, Scalar, Any, Vector], Vector]
+
+_ATTITUDE = ("X", "omega")
+_TRACKING = ("X", "xi", "X_d", "xi_d", "xi_d_dot")
+
+
+def law_force(law: Kernel | None, reference: Reference | None) -> ForceBody | None:
+    """The force of a law along a reference, as a body of (t, X, xi).
+
+    Raises:
+        InputError: the law has other inputs than (X, omega) or (X, xi, X_d, xi_d, xi_d_dot), or lacks its reference.
+    """
+    if law is None:
+        return None
+    names = tuple(port.name for port in law.inputs)
+    if names == _ATTITUDE:
+        return lambda ops, _t, X, xi: list(law.evaluate(ops, X, xi)[0])
+    if names != _TRACKING:
+        raise InputError(
+            f"the law {law.name} has the inputs {', '.join(names)}; a closed loop needs {', '.join(_ATTITUDE)} or "
+            f"{', '.join(_TRACKING)}"
+        )
+    if reference is None:
+        raise InputError(f"the law {law.name} tracks: give it a reference")
+    body = ReferenceBody(reference)
+
+    def force(ops: Arithmetic, t: Scalar, X: Any, xi: Vector) -> Vector:
+        return list(law.evaluate(ops, X, xi, *body(ops, t))[0])
+
+    return force
+
+
+def total_force(forces: Sequence[ForceBody | None]) -> ForceBody | None:
+    """The sum of forces; None if there is none."""
+    given = [force for force in forces if force is not None]
+    if not given:
+        return None
+    return lambda ops, t, X, xi: plus(*[force(ops, t, X, xi) for force in given])
+
+
+def second_order_step(
+    group: MatrixGroup, inertia: Any, force: ForceBody | None = None, name: str = "second_order_step"
+) -> Kernel:
+    """The step (state, t, h) -> (state_next,).
+
+    Args:
+        group: any matrix group.
+        inertia: symmetric positive definite.
+        force: body force; None for a free body.
+        name: C identifier.
+
+    Raises:
+        InputError: the inertia is not symmetric positive definite.
+    """
+    metric = positive_matrix(inertia, group.dim, "inertia")
+    size = packed_size(group)
+
+    def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar) -> tuple[Any, ...]:
+        X, xi = unpack(group, state[:size]), list(state[size:])
+        Theta, change = increments(ops, group, metric, force, X, xi, t, h)
+        return ([*pack(group, times_taylor_exp(group, ops, X, Theta)), *plus(xi, change)],)
+
+    data = WeiNormanData(group)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        X = random_element(group, data, rng)
+        xi = [rng.uniform(-1, 1) for _ in range(group.dim)]
+        return [*pack(group, X), *xi], rng.uniform(0, 1), rng.uniform(0, 0.05)
+
+    return Kernel(
+        name=name,
+        namespace=group.name,
+        inputs=(
+            Port("state", (size + group.dim,), description="varying entries of X, row by row, then xi"),
+            Port("t", (), "s"),
+            Port("h", (), "s"),
+        ),
+        outputs=(Port("state_next", (size + group.dim,)),),
+        body=body,
+        formula="X' = X hat(xi), I xi' = ad*_xi I xi + f: one RKMK4 step",
+        source="Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)",
+        sampler=sampler,
+    )
+
+
+def increments(
+    ops: Arithmetic,
+    group: MatrixGroup,
+    inertia: sp.MatrixBase,
+    force: ForceBody | None,
+    X: Any,
+    xi: Vector,
+    t: Scalar,
+    h: Scalar,
+) -> tuple[Vector, Vector]:
+    """Theta and the change of xi over a step."""
+
+    def acceleration(time: Scalar, Y: Any, eta: Vector) -> Vector:
+        applied = [0] * group.dim if force is None else force(ops, time, Y, eta)
+        return acceleration_body(ops, group, inertia, eta, applied)
+
+    def pulled(theta: Vector, eta: Vector) -> Vector:
+        """Theta' = eta + [Theta, eta]/2 + [Theta, [Theta, eta]]/12, signs for X' = X hat(xi)."""
+        once = bracket(ops, group.algebra, theta, eta)
+        twice = bracket(ops, group.algebra, theta, once)
+        return [e + a / 2 + b / 12 for e, a, b in zip(eta, once, twice, strict=True)]
+
+    half = h / 2
+    k1, a1 = xi, acceleration(t, X, xi)
+    theta, eta = scaled(half, k1), plus(xi, scaled(half, a1))
+    k2, a2 = pulled(theta, eta), acceleration(t + half, times_taylor_exp(group, ops, X, theta), eta)
+    theta, eta = scaled(half, k2), plus(xi, scaled(half, a2))
+    k3, a3 = pulled(theta, eta), acceleration(t + half, times_taylor_exp(group, ops, X, theta), eta)
+    theta, eta = scaled(h, k3), plus(xi, scaled(h, a3))
+    k4, a4 = pulled(theta, eta), acceleration(t + h, times_taylor_exp(group, ops, X, theta), eta)
+    weights = ((k1, a1, 1), (k2, a2, 2), (k3, a3, 2), (k4, a4, 1))
+    Theta = plus(*[scaled(h * w / 6, k) for k, _, w in weights])
+    return Theta, plus(*[scaled(h * w / 6, a) for _, a, w in weights])

@@ -1,0 +1,203 @@
+"""lc.closed_loop: a mechanical system on a group under a law, by a fourth-order Lie-group method in compiled loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.control.reference import Reference
+from lie_codegen.errors import ComputationError, InputError, NotOnGroupError, ShapeError
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernels.element_pattern import packed_size, varying_entries
+from lie_codegen.kernels.kernel import Kernel
+from lie_codegen.kernels.reference_kernels import check_reference, reference_kernel
+from lie_codegen.kernels.second_order_step import ForceBody, law_force, second_order_step, total_force
+from lie_codegen.runtime.build import build_kernels
+from lie_codegen.runtime.library import Library
+
+Array = NDArray[Any]
+
+_MOST_STEPS = 2**21
+_LARGEST_MOVE = 0.25
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """A solution of X' = X hat(xi), I xi' = ad*_xi I xi + f.
+
+    Attributes:
+        t: (k,) times.
+        X: (k, d, d) configurations, on the group to rounding; (k, N, d, d) for N initial states.
+        xi: (k, n) body velocities; (k, N, n).
+        outputs: what the law gives along the way, by the names of its outputs (force or torque, phi, W, W_dot, V ...).
+        X_d, xi_d: the reference, (k, d, d) and (k, n), or None.
+        steps: number of integration steps.
+        error_estimate: difference to the run with twice the step, over 15 (Richardson); NaN for a fixed step.
+    """
+
+    t: Array
+    X: Array
+    xi: Array
+    outputs: dict[str, Array]
+    X_d: Array | None
+    xi_d: Array | None
+    steps: int
+    error_estimate: float
+
+
+def closed_loop(
+    group: MatrixGroup,
+    *,
+    inertia: Any,
+    law: Kernel | None = None,
+    reference: Reference | None = None,
+    external: ForceBody | None = None,
+    X0: ArrayLike | None = None,
+    xi0: ArrayLike | None = None,
+    t: ArrayLike,
+    step: float | None = None,
+    tolerance: float = 1e-10,
+) -> ClosedLoop:
+    """Simulates the second-order system, compiled; the law itself is the one that `generate` writes for flight.
+
+    Args:
+        group: any matrix group.
+        inertia: symmetric positive definite.
+        law: an attitude or tracking law; None for an uncontrolled body.
+        reference: for a tracking law.
+        external: further body forces (ops, t, X, xi) -> (n,), as those of `underwater_forces`.
+        X0: (d, d) or (N, d, d) initial configurations, the identity if not given.
+        xi0: (n,) or (N, n) initial body velocities, zero if not given.
+        t: (k,) equally spaced times.
+        step: integration step [s]; None halves it until two runs agree to the tolerance.
+        tolerance: on the entries of X and xi at the times t, for step None.
+
+    Raises:
+        InputError: an inertia that is not positive definite, a reference that jumps, a law without its reference.
+        NotOnGroupError: X0 is off the group.
+        ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
+    """
+    times = _times(t)
+    if reference is not None:
+        if reference.group != group:
+            raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")
+        check_reference(reference, float(times[0]), float(times[-1]))
+    force = total_force([law_force(law, reference), external])
+    kernels = [second_order_step(group, inertia, force)]
+    kernels += [law] if law is not None else []
+    kernels += [reference_kernel(reference)] if reference is not None else []
+    lib = build_kernels(lambda: kernels, namespace=group.name)
+    start, many = initial_states(group, X0, xi0)
+    if step is not None:
+        count = max(1, int(np.ceil((times[1] - times[0]) / step - 1e-9)))
+        states, error = _run(lib, start, times, count, many), float("nan")
+    else:
+        states, count, error = _refined(lib, start, times, many, tolerance, group)
+    X, xi = split_states(group, states)
+    outputs, X_d, xi_d = _outputs(lib, law, reference, times, X, xi, many)
+    return ClosedLoop(times, X, xi, outputs, X_d, xi_d, count * (len(times) - 1), error)
+
+
+def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | None) -> tuple[Array, bool]:
+    """(N, m) packed states, and whether several were given.
+
+    Raises:
+        ShapeError: X0 or xi0 has another shape.
+        NotOnGroupError: an entry that is 0 or 1 in every element of the group is not.
+    """
+    d, n = group.degree, group.dim
+    kind = complex if group.is_complex else float
+    X = np.eye(d, dtype=kind) if X0 is None else np.asarray(X0, dtype=kind)
+    xi = np.zeros(n) if xi0 is None else np.asarray(xi0, dtype=float)
+    if X.shape[-2:] != (d, d) or X.ndim not in (2, 3) or xi.shape[-1:] != (n,) or xi.ndim not in (1, 2):
+        raise ShapeError(f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},)")
+    many = X.ndim == 3 or xi.ndim == 2
+    count = max(X.shape[0] if X.ndim == 3 else 1, xi.shape[0] if xi.ndim == 2 else 1)
+    X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
+    rows, columns = np.array(varying_entries(group)).T
+    fixed = np.ones((d, d), bool)
+    fixed[rows, columns] = False
+    if np.max(np.abs((X - np.eye(d))[:, fixed]), initial=0.0) > 1e-9:
+        raise NotOnGroupError(f"X0 is not on {group.name}: an entry that is 0 or 1 in every element is not")
+    entries = np.ascontiguousarray(X[:, rows, columns])
+    flat = entries.view(float) if group.is_complex else entries
+    return np.ascontiguousarray(np.concatenate([flat.reshape(count, -1), xi], axis=1)), many
+
+
+def split_states(group: MatrixGroup, states: Array) -> tuple[Array, Array]:
+    """X (..., d, d) and xi (..., n) of packed states (..., m)."""
+    size = packed_size(group)
+    packed = np.ascontiguousarray(states[..., :size])
+    values = packed.view(complex) if group.is_complex else packed
+    X = np.broadcast_to(
+        np.eye(group.degree, dtype=values.dtype), (*states.shape[:-1], group.degree, group.degree)
+    ).copy()
+    rows, columns = np.array(varying_entries(group)).T
+    X[..., rows, columns] = values
+    return X, np.ascontiguousarray(states[..., size : size + group.dim])
+
+
+def _times(t: ArrayLike) -> Array:
+    times = np.asarray(t, dtype=float)
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)):
+        raise ShapeError(f"closed_loop: t has shape {times.shape}; give at least two finite times")
+    gaps = np.diff(times)
+    if gaps[0] <= 0 or np.max(np.abs(gaps - gaps[0])) > 1e-9 * abs(gaps[0]) * len(times):
+        raise InputError("closed_loop: t must increase in equal steps, as numpy.linspace gives them")
+    return times
+
+
+def _run(lib: Library, start: Array, times: Array, every: int, many: bool) -> Array:
+    """(k, N, m) or (k, m) states at the times, `every` steps from one to the next."""
+    total = every * (len(times) - 1)
+    h = (times[-1] - times[0]) / total
+    if not many:
+        clock = times[0] + h * np.arange(total)
+        return np.asarray(lib.second_order_step.scan(start[0], n=total, every=every, t=clock, h=h))
+    states = np.empty((len(times), *start.shape))
+    states[0] = current = start
+    for index in range(total):
+        current = lib.second_order_step.batch(state=current, t=times[0] + h * index, h=h)
+        if (index + 1) % every == 0:
+            states[(index + 1) // every] = current
+    return states
+
+
+def _refined(
+    lib: Library, start: Array, times: Array, many: bool, tolerance: float, group: MatrixGroup
+) -> tuple[Array, int, float]:
+    every, previous = 1, None
+    gap = times[1] - times[0]
+    while every * (len(times) - 1) <= _MOST_STEPS:
+        states = _run(lib, start, times, every, many)
+        speed = np.max(np.abs(states[..., packed_size(group) :])) if np.all(np.isfinite(states)) else np.inf
+        if previous is not None and np.isfinite(speed):
+            error = float(np.max(np.abs(states - previous))) / 15
+            if error <= tolerance and speed * gap / every <= _LARGEST_MOVE:
+                return states, every, error
+        previous = states if np.isfinite(speed) else None
+        every *= 2
+    raise ComputationError(
+        f"closed_loop({group.name}): {_MOST_STEPS} steps do not bring the error below {tolerance:g}, or the state grows "
+        "without bound; shorten the time, loosen the tolerance, or check the gains"
+    )
+
+
+def _outputs(
+    lib: Library, law: Kernel | None, reference: Reference | None, times: Array, X: Array, xi: Array, many: bool
+) -> tuple[dict[str, Array], Array | None, Array | None]:
+    X_d = xi_d = None
+    arguments: list[Array] = []
+    shape = X.shape[:-2]
+    if reference is not None:
+        X_d, xi_d, rate = lib.reference.batch(times)
+        arguments = [np.repeat(x, shape[1], axis=0) if many else x for x in (X_d, xi_d, rate)]
+    if law is None:
+        return {}, X_d, xi_d
+    flat = [np.ascontiguousarray(x.reshape(-1, *x.shape[len(shape) :])) for x in (X, xi)]
+    values = lib[law.name].batch(*flat, *arguments)
+    names = [port.name for port in law.outputs]
+    return {key: v.reshape(*shape, *v.shape[1:]) for key, v in zip(names, values, strict=True)}, X_d, xi_d
