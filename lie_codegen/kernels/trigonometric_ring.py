@@ -16,7 +16,7 @@ import sympy as sp
 from sympy.polys.domains import QQ
 from sympy.polys.rings import PolyElement, ring
 
-from lie_codegen.algebra.exact import Number, field_elements
+from lie_codegen.algebra.exact import Number, exact_number, field_elements
 from lie_codegen.algebra.exponential import MatrixExponential
 from lie_codegen.errors import ComputationError
 
@@ -52,7 +52,9 @@ class TrigonometricRing:
         self._shown = shown
         numbers = {value for data in exponentials for row in data.entries.values() for value in row.values()}
         numbers.update(value for data in exponentials for mode in data.modes for value in (mode.rate, mode.frequency))
-        self.domain, _ = field_elements(sorted(numbers, key=sp.default_sort_key))
+        ordered = sorted(numbers, key=sp.default_sort_key)
+        self.domain, elements = field_elements(ordered)
+        self._known = dict(zip(ordered, elements, strict=True))
         self.ring, *generators = ring([sp.Dummy() for _ in shown], self.domain)
         self._generators: list[PolyElement] = generators
         self.coordinates = tuple(generators[: len(self.symbols)])
@@ -61,7 +63,19 @@ class TrigonometricRing:
 
     def constant(self, value: Any) -> Element:
         """An exact number."""
-        return self.ring.ground_new(self.domain.from_sympy(sp.sympify(value)))
+        return self.ring.ground_new(self._element(exact_number(value)))
+
+    def _element(self, value: Number) -> Any:
+        """A number of the field; an irrational factor is converted once (that takes an integer relation search)."""
+        if value not in self._known:
+            coefficient, rest = value.as_coeff_Mul()
+            if value.is_Add:
+                self._known[value] = sum((self._element(term) for term in value.args), self.domain.zero)
+            elif coefficient != 1 and rest != 1:
+                self._known[value] = self._element(coefficient) * self._element(rest)
+            else:
+                self._known[value] = self.domain.from_sympy(value)
+        return self._known[value]
 
     def cos(self, x: Element) -> Element:
         """cos of a multiple of one coordinate, as a Chebyshev polynomial of the base cosine."""
