@@ -18,6 +18,7 @@ def generate(
     *,
     namespace: str,
     metadata: PackageMetadata | Mapping[str, Any] | None = None,
+    extra: Mapping[str, str] | None = None,
 ) -> Path:
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
@@ -26,13 +27,14 @@ def generate(
         folder: created if need be; an existing one must be empty or hold an unedited package of ours.
         namespace: prefix of every symbol, and the name of the header and the CMake target.
         metadata: what the documentation says about the group: `PackageMetadata` or a mapping of its fields.
+        extra: further files of the package, {path: text}.
 
     Raises:
         CodegenError: a kernel cannot become C, or two symbols collide.
         IdentifierError: the namespace is no C identifier.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    return write_package(render_package(namespace, kernels, _metadata(metadata)), folder)
+    return write_package(render_package(namespace, kernels, _metadata(metadata), extra), folder)
 
 
 def _metadata(given: PackageMetadata | Mapping[str, Any] | None) -> PackageMetadata:

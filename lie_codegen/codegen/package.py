@@ -59,9 +59,12 @@ class _CsvRow:
 
 
 def render_package(
-    namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata | None = None
+    namespace: str,
+    kernels: Sequence[Kernel],
+    metadata: PackageMetadata | None = None,
+    extra: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
-    """The package as {path: text}; writes nothing.
+    """The package as {path: text}, with `extra` files of the same form; writes nothing.
 
     Raises:
         CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
@@ -77,6 +80,7 @@ def render_package(
         "example.c": render("example.c.jinja", package=view, checks=checks, tolerance=repr(TOLERANCE)),
         "test_vectors.csv": render("test_vectors.csv.jinja", rows=_csv_rows(kernels, vectors)),
         "README.md": render("README.md.jinja", package=view),
+        **(extra or {}),
     }
     return {**tree, "manifest.json": _manifest(view, kernels, tree)}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from lie_codegen.errors import InputError
 from lie_codegen.runtime.build import build_kernels
@@ -37,11 +37,20 @@ def build(what: Buildable) -> Library:
     return build_kernels(lambda: _kernels_of(group), namespace=group.name, definition=f"group\n{group.definition}")
 
 
-def generate(what: Buildable, folder: str | Path) -> Path:
+def generate(
+    what: Buildable, folder: str | Path, *, steering: Sequence[str | int] | Literal[True] | None = None
+) -> Path:
     """The C package of a group or of kernels, written as a folder; returns its path.
 
+    Args:
+        what: as `build`.
+        folder: created if need be.
+        steering: controls of a group, for a minimum-energy steering solver in the subfolder "steering", a C package by
+            itself with its own example and test vectors; True for all components.
+
     Raises:
-        InputError: as `build`.
+        InputError: as `build`; steering of kernels.
+        UncontrollableError: the controls of `steering` do not reach everything; says what is missing.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
     from lie_codegen.codegen.generate import generate as generate_package
@@ -53,9 +62,18 @@ def generate(what: Buildable, folder: str | Path) -> Path:
         what = load(what)
     group, kernels = _group_or_kernels(what)
     if group is None:
+        if steering is not None:
+            raise InputError("generate: steering needs a group, not kernels")
         return generate_package(kernels, folder, namespace=_namespace(kernels))
+    extra = _steering(group, steering) if steering is not None else {}
     metadata = PackageMetadata(title=group.name, description=_about(group), labels=group.labels, units=group.units)
-    return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata)
+    return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata, extra=extra)
+
+
+def _steering(group: MatrixGroup, controls: Sequence[str | int] | Literal[True]) -> dict[str, str]:
+    from lie_codegen.codegen.steering_package import render_steering_package
+
+    return render_steering_package(group, group.labels if controls is True else controls, folder="steering")
 
 
 def _about(group: MatrixGroup) -> str:
