@@ -163,7 +163,7 @@ def test_an_initial_element_multiplies_from_the_left() -> None:
 
 def test_refusals_name_theorem_and_condition() -> None:
     group = lc.group("so3")
-    with pytest.raises(AssumptionError, match="Theorem 3.*u_av = 0.*1/2"):
+    with pytest.raises(AssumptionError, match=r"Theorem 3.*u_av = 0.*1/2"):
         lc.average(group, lc.PeriodicInput(MIXED, "2*pi"), 2, "product")
     with pytest.raises(AssumptionError, match="Theorem 4"):
         lc.average(group, lc.PeriodicInput(MIXED, "2*pi"), 3, "single")
@@ -176,7 +176,7 @@ def test_refusals_name_theorem_and_condition() -> None:
     with pytest.raises(InputError, match="order must be"):
         lc.average(group, lc.PeriodicInput(ZERO_MEAN, "2*pi"), 0)
     square = lc.PeriodicInput.from_pieces([(1, ["1", "0", "0"]), (2, ["-1", "0", "0"])])
-    with pytest.warns(AssumptionWarning, match="Theorem 3.*t = 1"):
+    with pytest.warns(AssumptionWarning, match=r"Theorem 3.*t = 1"):
         lc.average(group, square, 2, "product")
 
 

@@ -64,17 +64,17 @@ def test_the_smallest_common_period_is_found() -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
-        (dict(components=["cos(t)", "cos(sqrt(2)*t)"]), PeriodError, "no common period"),
-        (dict(components=["cos(2*t/3)"], period="2*pi"), PeriodError, "common period 3\\*pi"),
-        (dict(components=["cos(t)", "t"], period="2*pi"), PeriodError, "component 2, t, is not periodic"),
-        (dict(components=["exp(cos(t))"]), PeriodError, "give its period"),
-        (dict(components=["cos(t)"], period=-1), PeriodError, "not positive"),
-        (dict(components=["a*cos(t)"]), ExpressionError, "no name 'a'"),
-        (dict(components=[sp.Symbol("a") * sp.cos(sp.Symbol("t"))]), InputError, "not declared"),
-        (dict(components=["a*exp(cos(t))"], period="2*pi", parameters=("a",)), InputError, "have none"),
-        (dict(components=["__import__('os')"]), ExpressionError, "column"),
-        (dict(components="cos(t)"), InputError, "list of formulas"),
-        (dict(components=[]), InputError, "no component"),
+        ({"components": ["cos(t)", "cos(sqrt(2)*t)"]}, PeriodError, "no common period"),
+        ({"components": ["cos(2*t/3)"], "period": "2*pi"}, PeriodError, "common period 3\\*pi"),
+        ({"components": ["cos(t)", "t"], "period": "2*pi"}, PeriodError, "component 2, t, is not periodic"),
+        ({"components": ["exp(cos(t))"]}, PeriodError, "give its period"),
+        ({"components": ["cos(t)"], "period": -1}, PeriodError, "not positive"),
+        ({"components": ["a*cos(t)"]}, ExpressionError, "no name 'a'"),
+        ({"components": [sp.Symbol("a") * sp.cos(sp.Symbol("t"))]}, InputError, "not declared"),
+        ({"components": ["a*exp(cos(t))"], "period": "2*pi", "parameters": ("a",)}, InputError, "have none"),
+        ({"components": ["__import__('os')"]}, ExpressionError, "column"),
+        ({"components": "cos(t)"}, InputError, "list of formulas"),
+        ({"components": []}, InputError, "no component"),
     ],
 )
 def test_refusals_name_the_culprit(arguments: dict, error: type, words: str) -> None:

@@ -341,6 +341,15 @@ def _formula(entry: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     return exact_number(entry)
 
 
+def period_of(value: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
+    """A period given as text, number or SymPy expression in the given symbols.
+
+    Raises:
+        InputError: if it is not understood or depends on t.
+    """
+    return _number(value, "period", symbols)
+
+
 def _number(value: Any, what: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     if isinstance(value, float | np.floating):
         return _binary(value)

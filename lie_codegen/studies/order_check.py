@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.averaging.averaged import Averaged, average
+from lie_codegen.averaging.chart_limit import chart_end
 from lie_codegen.averaging.periodic_input import PeriodicInput
-from lie_codegen.errors import InputError
+from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.studies.attitude_metrics import METRICS, distances
 from lie_codegen.studies.reference_flow import ReferenceFlow, reference_flow
@@ -42,6 +44,7 @@ class OrderCheck:
         next_rate_vanishes: whether F_{p+1} = 0, so that the secular error is one order better.
         nilpotent: whether the algebra is nilpotent and the average of this order its exact solution.
         slope: the slope of the least-squares line through log errors; NaN where fewer than two are above rounding.
+        chart_end: first time at which the theorem's chart ends for the largest eps (see `chart_limit`); None if it does not.
         passed: exact, or the last slope or the fitted one is at least order - 0.15.
     """
 
@@ -60,6 +63,7 @@ class OrderCheck:
     next_rate_vanishes: bool
     nilpotent: bool
     slope: float
+    chart_end: float | None
     passed: bool
 
     @property
@@ -104,8 +108,16 @@ def order_check(
     if metric not in METRICS:
         raise InputError(f"order_check: no metric {metric!r}; choose one of {', '.join(METRICS)}")
     averaged = average(group, u, order, form)
+    end = chart_end(averaged, values[0], horizon)
+    if end is not None:
+        warnings.warn(
+            f"order_check: for eps = {values[0]:g} the secular exponent of the {form} form leaves its chart at t = {end:.4g}, "
+            f"before b / eps = {horizon / values[0]:.4g}; the theorem claims nothing beyond (the numbers below are measured)",
+            AssumptionWarning,
+            stacklevel=2,
+        )
     sup, whole = measure(group, u, averaged.state, values, horizon, metric)
-    return _report(averaged, metric, horizon, values, sup, whole)
+    return _report(averaged, metric, horizon, end, values, sup, whole)
 
 
 def measure(
@@ -138,7 +150,13 @@ def _fit(eps: Sequence[float], errors: Sequence[float]) -> float:
 
 
 def _report(
-    averaged: Averaged, metric: str, horizon: float, eps: tuple[float, ...], sup: list[float], whole: list[float]
+    averaged: Averaged,
+    metric: str,
+    horizon: float,
+    end: float | None,
+    eps: tuple[float, ...],
+    sup: list[float],
+    whole: list[float],
 ) -> OrderCheck:
     measured = slopes(eps, sup)
     exact = all(error <= 50 * _FLOOR for error in sup)
@@ -161,5 +179,6 @@ def _report(
         next_rate_vanishes=averaged.next_rate_vanishes,
         nilpotent=averaged.exact_flow,
         slope=fitted,
+        chart_end=end,
         passed=exact or best >= averaged.order - SHORTFALL,
     )

@@ -1,0 +1,105 @@
+"""The Magnus series X(t) = exp(Z(t)), Z = sum eps^q Z_q(t), of any order, exactly.
+
+    Z' = sum_k (-1)^k B_k / k! ad_Z^k eps U          (X' = eps X U; B_1 = -1/2)
+       = eps U + eps^2 / 2 [Ut, U] + eps^3 / 4 [int [Ut, U], U] + eps^3 / 12 [Ut, [Ut, U]] + ...
+
+TR 93-59, (38) and (43); the recursion over orders is that of `floquet` with no mean taken out, so Z_q is secular: it has
+powers of t up to q. Z_q(T) = T F_q.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from math import factorial
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.averaging.batched_exponential import expm
+from lie_codegen.averaging.floquet import bernoulli
+from lie_codegen.averaging.periodic_input import TIME, PeriodicInput
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Array = NDArray[Any]
+
+_MOST = 12
+
+
+@dataclass(frozen=True)
+class Magnus:
+    """The Magnus series of X' = eps X hat(u), X(0) = I, to order p.
+
+    Attributes:
+        group, u, order: what was expanded and how far.
+    """
+
+    group: MatrixGroup
+    u: PeriodicInput
+    order: int
+    _calculus: Any
+    _signals: tuple[Any, ...]
+
+    @cached_property
+    def exact_Z(self) -> tuple[sp.ImmutableMatrix, ...]:
+        """Z_1 .. Z_p, each (n, 1), as expressions in t."""
+        waveform, n = self.u.waveform, self.group.dim
+        return tuple(
+            waveform.expressions(self._calculus, signal, n, TIME) / waveform.omega**q
+            for q, signal in enumerate(self._signals, start=1)
+        )
+
+    @cached_property
+    def Z(self) -> list[Callable[[ArrayLike], Array]]:
+        """[Z_1, .., Z_p]: functions of t, (...,) -> (..., n)."""
+        waveform, n = self.u.waveform, self.group.dim
+        omega = float(waveform.omega) if not waveform.omega.free_symbols else 1.0
+        evaluators = [waveform.evaluator(self._calculus, signal, n) for signal in self._signals]
+        return [
+            lambda t, f=evaluate, s=omega**-q: s * f(np.asarray(t, dtype=float))  # type: ignore[misc]
+            for q, evaluate in enumerate(evaluators, start=1)
+        ]
+
+    def exponent(self, eps: float, t: ArrayLike) -> Array:
+        """sum_{q<=p} eps^q Z_q(t): (...,) -> (..., n)."""
+        total = sum((eps**q * z(t) for q, z in enumerate(self.Z, start=1)), np.zeros(self.group.dim))
+        return np.asarray(total)
+
+    def state(self, eps: float, t: ArrayLike) -> Array:
+        """exp(hat(exponent)): (...,) -> (..., d, d)."""
+        return expm(self.group.hat(self.exponent(eps, t)))
+
+
+def magnus(group: MatrixGroup, u: PeriodicInput, order: int) -> Magnus:
+    """The Magnus series to a given order.
+
+    It converges for t up to a limit only: see `convergence`. For times of order 1 / eps use `average`.
+
+    Raises:
+        InputError: an order that is not 1 to 12, or a sampled input (its secular terms are not periodic).
+        ShapeError: if u has not n components.
+    """
+    if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= _MOST:
+        raise InputError(f"magnus: order must be an integer from 1 to {_MOST}, got {order!r}")
+    if u.dim != group.dim:
+        raise ShapeError(f"magnus: u has {u.dim} components, {group.name} has {group.dim}: {', '.join(group.labels)}")
+    if not u.exact:
+        raise InputError("magnus: the input is sampled; the Magnus series needs sums of sines and cosines")
+    calculus, signal = u.waveform.calculus(group.algebra.table, group.dim)
+    weights = [abs(b) / factorial(k) if k == 1 else b / factorial(k) for k, b in enumerate(bernoulli(order + 1))]
+    found: list[Any] = []
+    nested: dict[tuple[int, int], Any] = {(0, 1): signal}
+    for q in range(1, order + 1):
+        terms: list[tuple[Fraction | int, Any]] = [(1, signal)] if q == 1 else []
+        for k in range(1, q):
+            inner = [(m, nested[k - 1, q - m]) for m in range(1, q) if (k - 1, q - m) in nested]
+            value = calculus.combine([(1, calculus.bracket(found[m - 1], s)) for m, s in inner])
+            nested[k, q] = value
+            terms.append((weights[k], value))
+        found.append(calculus.primitive(calculus.combine(terms)))
+    return Magnus(group, u, order, calculus, tuple(found))
