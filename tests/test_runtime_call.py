@@ -17,7 +17,7 @@ from lie_codegen.runtime.build import build_kernels, interpreted
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.runtime.library import Library
 
-HOWS = ["compiled", "interpreted"] if find_compilers() else ["interpreted"]
+HOWS = ["compiled", "ctypes", "interpreted"] if find_compilers() else ["interpreted"]
 
 
 @pytest.fixture(scope="module", params=HOWS)
@@ -27,6 +27,7 @@ def lib(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
         return
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIE_CODEGEN_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("LIE_CODEGEN_CALL", request.param)
         library = build_kernels(lambda: toy_kernels.KERNELS)
         assert library.compiled
         yield library

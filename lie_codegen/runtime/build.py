@@ -28,6 +28,7 @@ from lie_codegen.runtime.compiler import (
 )
 from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
 from lie_codegen.runtime.library import Library, check_names
+from lie_codegen.runtime.quick import quick
 
 _SUFFIX = ".so"
 
@@ -174,5 +175,8 @@ def _open_or_none(entry: cache.Entry) -> Library | None:
 
 def _open(entry: cache.Entry) -> Library:
     shared = load_library(entry.library)
-    functions = [Compiled(signature, CtypesBackend(shared, signature), compiled=True) for signature in entry.signatures]
+    functions = [
+        quick(Compiled(signature, CtypesBackend(shared, signature), compiled=True), shared, signature)
+        for signature in entry.signatures
+    ]
     return Library(entry.namespace, functions, entry.library)

@@ -42,8 +42,15 @@ def cache_info() -> CacheInfo:
 
 
 def clear_cache() -> int:
-    """Remove every library and request, and nothing else; return the number of libraries removed."""
+    """Remove every library and request, and nothing else; return the number of libraries of kernels removed."""
     folder = cache_folder()
+    _clear(folder / "python")
+    with contextlib.suppress(OSError):
+        (folder / "python").rmdir()
+    return _clear(folder)
+
+
+def _clear(folder: Path) -> int:
     entries = _entries(folder)
     for entry in entries:
         _remove_entry(entry)

@@ -20,6 +20,7 @@ class Compiled:
         name: attribute of the library.
         inputs, outputs: the ports.
         compiled: False where CasADi's interpreter stands in for C.
+        result_type: named tuple of several outputs, or None.
     """
 
     def __init__(self, signature: Signature, backend: Backend, *, compiled: bool) -> None:
@@ -31,7 +32,7 @@ class Compiled:
         self._signature = signature
         self._backend = backend
         fields = [python_field(port.name) for port in signature.outputs]
-        self._result: Any = namedtuple(f"{signature.name}_result", fields) if len(fields) > 1 else None
+        self.result_type: Any = namedtuple(f"{signature.name}_result", fields) if len(fields) > 1 else None
         self._scalar = not signature.outputs[0].shape
 
     def __call__(self, *args: Any, out: Any = None, **named: Any) -> Any:
@@ -115,9 +116,9 @@ class Compiled:
 
     def _wrap(self, outputs: list[Array], out: Any, *, scalars: bool) -> Any:
         if out is not None:
-            return out if self._result is None else self._result(*outputs)
+            return out if self.result_type is None else self.result_type(*outputs)
         values = [array.item() if scalars and array.ndim == 0 else array for array in outputs]
-        return values[0] if self._result is None else self._result(*values)
+        return values[0] if self.result_type is None else self.result_type(*values)
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"

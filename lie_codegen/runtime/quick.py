@@ -1,0 +1,36 @@
+"""Compiled kernels as objects of the extension type: the same calls, a hundred times sooner."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import cast
+
+from lie_codegen.codegen.signature import Signature
+from lie_codegen.kernels.kernel import Port
+from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.extension import extension
+
+_MOST_PORTS = 32
+
+
+def quick(compiled: Compiled, library: ctypes.CDLL, signature: Signature) -> Compiled:
+    """`compiled` behind a fast path for exact arguments; itself where there is no extension.
+
+    What the fast path does not take, and every attribute but `batch`, is that of `compiled`.
+    """
+    module = extension()
+    if module is None or len(signature.inputs + signature.outputs) > _MOST_PORTS:
+        return compiled
+    call, batch = (_address(library, f"{signature.symbol}_{form}") for form in ("call", "batch"))
+    inputs, outputs = _plain(signature.inputs), _plain(signature.outputs)
+    samples = module.function(0, batch, inputs, outputs, compiled.batch, compiled.batch, None, compiled.result_type)
+    fast = module.function(call, 0, inputs, outputs, compiled, compiled, samples, compiled.result_type)
+    return cast(Compiled, fast)
+
+
+def _address(library: ctypes.CDLL, symbol: str) -> int:
+    return ctypes.cast(library[symbol], ctypes.c_void_p).value or 0
+
+
+def _plain(ports: tuple[Port, ...]) -> tuple[tuple[str, tuple[int, ...], bool], ...]:
+    return tuple((port.name, port.shape, port.is_complex) for port in ports)

@@ -1,0 +1,487 @@
+/*
+ * Kernels as Python callables, by the vectorcall protocol: compiled once for a Python and a numpy, whatever the kernels.
+ *
+ * An argument that is exactly what a port takes (a C-contiguous, aligned array of its type and shape; a Python number
+ * for a scalar) goes straight to the C function. Everything else, and every error, is the business of the Python
+ * callable `slow`, which gets the arguments unchanged: so both ways mean the same.
+ */
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define NPY_NO_DEPRECATED_API NPY_1_7_API_VERSION
+#include <numpy/arrayobject.h>
+
+#define MOST_PORTS 32
+#define RELEASE_FROM 32 /* samples from which giving up the interpreter lock pays */
+
+typedef struct {
+    int ndim;
+    int is_complex;
+    npy_intp dims[2];
+    npy_intp size; /* doubles */
+    PyArray_Descr *descr;
+    PyObject *name;
+} Port;
+
+typedef void (*call_function)(const double *const *, double *const *);
+typedef void (*batch_function)(ptrdiff_t, const double *const *, const ptrdiff_t *, double *const *);
+
+typedef struct {
+    PyObject_HEAD
+    vectorcallfunc vectorcall;
+    call_function call;   /* one of the two is set */
+    batch_function batch;
+    PyObject *slow;       /* takes whatever the fast path does not */
+    PyObject *owner;      /* answers for every other attribute */
+    PyObject *samples;    /* the batched form, or NULL */
+    PyTypeObject *result; /* type of several outputs, a tuple without fields of its own; or NULL */
+    int n_in, n_out;
+    Port ports[MOST_PORTS];
+} Function;
+
+static PyTypeObject FunctionType;
+static PyObject *out_word;
+
+/* Whether an array has the port's shape after `lead` leading axes, its type and a plain layout. */
+static inline int fits(const Port *port, PyArrayObject *array, int lead, int flags)
+{
+    const npy_intp *dims = PyArray_DIMS(array) + lead;
+    return PyArray_TYPE(array) == (port->is_complex ? NPY_CDOUBLE : NPY_DOUBLE) && PyArray_NDIM(array) == port->ndim + lead
+        && (port->ndim < 1 || dims[0] == port->dims[0]) && (port->ndim < 2 || dims[1] == port->dims[1])
+        && PyArray_CHKFLAGS(array, flags) && PyArray_ISNOTSWAPPED(array);
+}
+
+/* A Python number for a scalar port: 1 if it was one. */
+static inline int number(const Port *port, PyObject *value, double *to)
+{
+    if (port->ndim != 0) {
+        return 0;
+    }
+    if (PyFloat_Check(value)) {
+        to[0] = PyFloat_AS_DOUBLE(value);
+        to[1] = 0.0;
+        return 1;
+    }
+    if (PyLong_CheckExact(value)) {
+        int overflow;
+        const long small = PyLong_AsLongAndOverflow(value, &overflow);
+        to[0] = (double)small;
+        to[1] = 0.0;
+        return overflow == 0;
+    }
+    if (port->is_complex && PyComplex_CheckExact(value)) {
+        const Py_complex both = PyComplex_AsCComplex(value);
+        to[0] = both.real;
+        to[1] = both.imag;
+        return 1;
+    }
+    return 0;
+}
+
+/* Positional and keyword arguments in the order of the inputs; 0 where Python must judge. */
+static int bind(const Function *self, PyObject *const *args, Py_ssize_t nargs, PyObject *kwnames, PyObject **values,
+    PyObject **out)
+{
+    const Py_ssize_t named = kwnames == NULL ? 0 : PyTuple_GET_SIZE(kwnames);
+    Py_ssize_t k, missing = self->n_in - nargs;
+    int i;
+    if (missing < 0) {
+        return 0;
+    }
+    for (i = 0; i < self->n_in; ++i) {
+        values[i] = i < nargs ? args[i] : NULL;
+    }
+    for (k = 0; k < named; ++k) {
+        PyObject *name = PyTuple_GET_ITEM(kwnames, k), *value = args[nargs + k];
+        if (name == out_word) {
+            *out = value == Py_None ? NULL : value;
+            continue;
+        }
+        for (i = 0; i < self->n_in && self->ports[i].name != name; ++i) {
+        }
+        if (i == self->n_in || values[i] != NULL) {
+            return 0;
+        }
+        values[i] = value;
+        --missing;
+    }
+    return missing == 0;
+}
+
+static PyObject *several(const Function *self, PyObject **outputs)
+{
+    PyObject *tuple = self->result->tp_alloc(self->result, self->n_out);
+    int i;
+    for (i = 0; i < self->n_out; ++i) {
+        if (tuple == NULL) {
+            Py_DECREF(outputs[i]);
+        } else {
+            PyTuple_SET_ITEM(tuple, i, outputs[i]);
+        }
+    }
+    return tuple;
+}
+
+static inline PyObject *new_array(const Port *port, int ndim, npy_intp *dims)
+{
+    Py_INCREF(port->descr);
+    return PyArray_NewFromDescr(&PyArray_Type, port->descr, ndim, dims, NULL, NULL, 0, NULL);
+}
+
+static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t nargsf, PyObject *kwnames)
+{
+    Function *self = (Function *)callable;
+    const Py_ssize_t nargs = PyVectorcall_NARGS(nargsf);
+    PyObject *bound[MOST_PORTS], *outputs[MOST_PORTS], *out = NULL, *const *values = args;
+    const double *in[MOST_PORTS];
+    double *to[MOST_PORTS], numbers[MOST_PORTS][2];
+    int i;
+    if (kwnames != NULL || nargs != self->n_in) {
+        if (!bind(self, args, nargs, kwnames, bound, &out)) {
+            goto slowly;
+        }
+        values = bound;
+    }
+    for (i = 0; i < self->n_in; ++i) {
+        const Port *port = &self->ports[i];
+        if (PyArray_CheckExact(values[i])) {
+            PyArrayObject *array = (PyArrayObject *)values[i];
+            if (!fits(port, array, 0, NPY_ARRAY_CARRAY_RO)) {
+                goto slowly;
+            }
+            in[i] = PyArray_DATA(array);
+        } else if (number(port, values[i], numbers[i])) {
+            in[i] = numbers[i];
+        } else {
+            goto slowly;
+        }
+    }
+    if (out != NULL) {
+        if (self->n_out != 1 || !PyArray_CheckExact(out)
+            || !fits(&self->ports[self->n_in], (PyArrayObject *)out, 0, NPY_ARRAY_CARRAY)) {
+            goto slowly;
+        }
+        to[0] = PyArray_DATA((PyArrayObject *)out);
+        self->call(in, to);
+        Py_INCREF(out);
+        return out;
+    }
+    for (i = 0; i < self->n_out; ++i) {
+        Port *port = &self->ports[self->n_in + i];
+        if (port->ndim == 0) {
+            outputs[i] = NULL;
+            to[i] = numbers[i]; /* the kernel reads every input before it writes an output */
+            continue;
+        }
+        outputs[i] = new_array(port, port->ndim, port->dims);
+        if (outputs[i] == NULL) {
+            goto failed;
+        }
+        to[i] = PyArray_DATA((PyArrayObject *)outputs[i]);
+    }
+    self->call(in, to);
+    for (i = 0; i < self->n_out; ++i) {
+        if (outputs[i] == NULL) {
+            outputs[i] = self->ports[self->n_in + i].is_complex ? PyComplex_FromDoubles(to[i][0], to[i][1])
+                                                                : PyFloat_FromDouble(to[i][0]);
+            if (outputs[i] == NULL) {
+                int k;
+                for (k = i + 1; k < self->n_out; ++k) {
+                    Py_XDECREF(outputs[k]);
+                }
+                goto failed;
+            }
+        }
+    }
+    return self->result == NULL ? outputs[0] : several(self, outputs);
+failed:
+    while (i-- > 0) {
+        Py_XDECREF(outputs[i]);
+    }
+    return NULL;
+slowly:
+    return PyObject_Vectorcall(self->slow, args, (size_t)nargs, kwnames);
+}
+
+/* Whether two ranges of memory share a byte. */
+static int overlap(const void *a, npy_intp a_size, const void *b, npy_intp b_size)
+{
+    const uintptr_t x = (uintptr_t)a, y = (uintptr_t)b;
+    return x < y + (uintptr_t)b_size && y < x + (uintptr_t)a_size;
+}
+
+static PyObject *call_batch(PyObject *callable, PyObject *const *args, size_t nargsf, PyObject *kwnames)
+{
+    Function *self = (Function *)callable;
+    const Py_ssize_t nargs = PyVectorcall_NARGS(nargsf);
+    PyObject *values[MOST_PORTS], *outputs[MOST_PORTS], *out = NULL;
+    const double *in[MOST_PORTS];
+    double *to[MOST_PORTS], numbers[MOST_PORTS][2];
+    ptrdiff_t strides[MOST_PORTS];
+    npy_intp count = -1;
+    int i;
+    if (!bind(self, args, nargs, kwnames, values, &out)) {
+        goto slowly;
+    }
+    for (i = 0; i < self->n_in; ++i) {
+        const Port *port = &self->ports[i];
+        if (PyArray_CheckExact(values[i])) {
+            PyArrayObject *array = (PyArrayObject *)values[i];
+            const int lead = PyArray_NDIM(array) > port->ndim;
+            if (!fits(port, array, lead, NPY_ARRAY_CARRAY_RO)) {
+                goto slowly;
+            }
+            if (lead) {
+                if (count >= 0 && count != PyArray_DIM(array, 0)) {
+                    goto slowly;
+                }
+                count = PyArray_DIM(array, 0);
+            }
+            in[i] = PyArray_DATA(array);
+            strides[i] = lead ? port->size : 0;
+        } else if (number(port, values[i], numbers[i])) {
+            in[i] = numbers[i];
+            strides[i] = 0;
+        } else {
+            goto slowly;
+        }
+    }
+    if (count < 0) {
+        goto slowly;
+    }
+    if (out != NULL) {
+        PyArrayObject *array = (PyArrayObject *)out;
+        if (self->n_out != 1 || !PyArray_CheckExact(out) || !fits(&self->ports[self->n_in], array, 1, NPY_ARRAY_CARRAY)
+            || PyArray_DIM(array, 0) != count) {
+            goto slowly;
+        }
+        for (i = 0; i < self->n_in; ++i) {
+            const npy_intp doubles = strides[i] == 0 ? self->ports[i].size : count * self->ports[i].size;
+            if (overlap(in[i], doubles * (npy_intp)sizeof(double), PyArray_DATA(array), PyArray_NBYTES(array))) {
+                goto slowly;
+            }
+        }
+        to[0] = PyArray_DATA(array);
+        Py_INCREF(out);
+        outputs[0] = out;
+    } else {
+        for (i = 0; i < self->n_out; ++i) {
+            const Port *port = &self->ports[self->n_in + i];
+            npy_intp dims[3];
+            dims[0] = count;
+            dims[1] = port->dims[0];
+            dims[2] = port->dims[1];
+            outputs[i] = new_array(port, port->ndim + 1, dims);
+            if (outputs[i] == NULL) {
+                while (i-- > 0) {
+                    Py_DECREF(outputs[i]);
+                }
+                return NULL;
+            }
+            to[i] = PyArray_DATA((PyArrayObject *)outputs[i]);
+        }
+    }
+    if (count < RELEASE_FROM) {
+        self->batch(count, in, strides, to);
+    } else { /* the caller holds references to the arrays */
+        PyThreadState *state = PyEval_SaveThread();
+        self->batch(count, in, strides, to);
+        PyEval_RestoreThread(state);
+    }
+    return self->result == NULL ? outputs[0] : several(self, outputs);
+slowly:
+    return PyObject_Vectorcall(self->slow, args, (size_t)nargs, kwnames);
+}
+
+static int read_ports(Function *self, PyObject *given, int first)
+{
+    Py_ssize_t k;
+    for (k = 0; k < PyTuple_GET_SIZE(given); ++k) {
+        Port *port = &self->ports[first + k];
+        PyObject *name, *shape;
+        int side;
+        if (!PyArg_ParseTuple(PyTuple_GET_ITEM(given, k), "UO!p", &name, &PyTuple_Type, &shape, &port->is_complex)) {
+            return -1;
+        }
+        if (PyTuple_GET_SIZE(shape) > 2) {
+            PyErr_SetString(PyExc_ValueError, "a port has at most two axes");
+            return -1;
+        }
+        port->ndim = (int)PyTuple_GET_SIZE(shape);
+        port->size = port->is_complex ? 2 : 1;
+        for (side = 0; side < port->ndim; ++side) {
+            port->dims[side] = PyLong_AsSsize_t(PyTuple_GET_ITEM(shape, side));
+            if (port->dims[side] < 1) {
+                PyErr_SetString(PyExc_ValueError, "the sides of a port are positive");
+                return -1;
+            }
+            port->size *= port->dims[side];
+        }
+        Py_INCREF(name);
+        PyUnicode_InternInPlace(&name);
+        port->name = name;
+        port->descr = PyArray_DescrFromType(port->is_complex ? NPY_CDOUBLE : NPY_DOUBLE);
+    }
+    return 0;
+}
+
+PyDoc_STRVAR(function_doc,
+    "function(call, batch, inputs, outputs, slow, owner, samples, result)\n\n"
+    "call, batch: address of the C function, one of them 0. inputs, outputs: (name, shape, is_complex) each.\n"
+    "slow: takes what the fast path does not. owner: has the other attributes. samples: attribute `batch`, or None.\n"
+    "result: named tuple type of several outputs, or None.");
+
+static PyObject *make_function(PyObject *module, PyObject *args)
+{
+    unsigned long long call, batch;
+    PyObject *inputs, *outputs, *slow, *owner, *samples, *result;
+    Function *self;
+    (void)module;
+    if (!PyArg_ParseTuple(args, "KKO!O!OOOO", &call, &batch, &PyTuple_Type, &inputs, &PyTuple_Type, &outputs, &slow,
+            &owner, &samples, &result)) {
+        return NULL;
+    }
+    if (PyTuple_GET_SIZE(inputs) + PyTuple_GET_SIZE(outputs) > MOST_PORTS || PyTuple_GET_SIZE(outputs) < 1
+        || (call == 0) == (batch == 0) || (result == Py_None) != (PyTuple_GET_SIZE(outputs) == 1)
+        || (result != Py_None && !PyType_Check(result))) {
+        PyErr_SetString(PyExc_ValueError, "no such function");
+        return NULL;
+    }
+    self = PyObject_GC_New(Function, &FunctionType);
+    if (self == NULL) {
+        return NULL;
+    }
+    memset((char *)self + offsetof(Function, vectorcall), 0, sizeof *self - offsetof(Function, vectorcall));
+    self->vectorcall = call != 0 ? call_one : call_batch;
+    self->call = (call_function)(uintptr_t)call;
+    self->batch = (batch_function)(uintptr_t)batch;
+    self->slow = Py_NewRef(slow);
+    self->owner = Py_NewRef(owner);
+    self->samples = samples == Py_None ? NULL : Py_NewRef(samples);
+    self->result = result == Py_None ? NULL : (PyTypeObject *)Py_NewRef(result);
+    self->n_in = (int)PyTuple_GET_SIZE(inputs);
+    self->n_out = (int)PyTuple_GET_SIZE(outputs);
+    PyObject_GC_Track(self);
+    if (read_ports(self, inputs, 0) < 0 || read_ports(self, outputs, self->n_in) < 0) {
+        Py_DECREF(self);
+        return NULL;
+    }
+    return (PyObject *)self;
+}
+
+static int traverse(PyObject *object, visitproc visit, void *arg)
+{
+    Function *self = (Function *)object;
+    Py_VISIT(self->slow);
+    Py_VISIT(self->owner);
+    Py_VISIT(self->samples);
+    Py_VISIT(self->result);
+    return 0;
+}
+
+static int clear(PyObject *object)
+{
+    Function *self = (Function *)object;
+    Py_CLEAR(self->slow);
+    Py_CLEAR(self->owner);
+    Py_CLEAR(self->samples);
+    Py_CLEAR(self->result);
+    return 0;
+}
+
+static void destroy(PyObject *object)
+{
+    Function *self = (Function *)object;
+    int i;
+    PyObject_GC_UnTrack(object);
+    clear(object);
+    for (i = 0; i < MOST_PORTS; ++i) {
+        Py_XDECREF(self->ports[i].descr);
+        Py_XDECREF(self->ports[i].name);
+    }
+    PyObject_GC_Del(object);
+}
+
+static PyObject *get_attribute(PyObject *object, PyObject *name)
+{
+    PyObject *found = PyObject_GenericGetAttr(object, name);
+    if (found == NULL && PyErr_ExceptionMatches(PyExc_AttributeError) && ((Function *)object)->owner != NULL) {
+        PyErr_Clear();
+        found = PyObject_GetAttr(((Function *)object)->owner, name);
+    }
+    return found;
+}
+
+static PyObject *get_samples(PyObject *object, void *closure)
+{
+    Function *self = (Function *)object;
+    (void)closure;
+    if (self->samples == NULL) {
+        PyErr_SetString(PyExc_AttributeError, "batch");
+        return NULL;
+    }
+    return Py_NewRef(self->samples);
+}
+
+static PyObject *get_doc(PyObject *object, void *closure)
+{
+    (void)closure;
+    return PyObject_GetAttrString(((Function *)object)->owner, "__doc__");
+}
+
+static PyObject *represent(PyObject *object)
+{
+    return PyObject_Repr(((Function *)object)->owner);
+}
+
+static PyObject *directory(PyObject *object, PyObject *unused)
+{
+    (void)unused;
+    return PyObject_Dir(((Function *)object)->owner);
+}
+
+static PyGetSetDef attributes[] = {
+    {"batch", get_samples, NULL, NULL, NULL},
+    {"__doc__", get_doc, NULL, NULL, NULL},
+    {NULL, NULL, NULL, NULL, NULL},
+};
+
+static PyMethodDef methods[] = {
+    {"__dir__", directory, METH_NOARGS, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+static PyTypeObject FunctionType = {
+    PyVarObject_HEAD_INIT(NULL, 0)
+    .tp_name = "lie_codegen.kernel",
+    .tp_basicsize = sizeof(Function),
+    .tp_dealloc = destroy,
+    .tp_vectorcall_offset = offsetof(Function, vectorcall),
+    .tp_repr = represent,
+    .tp_call = PyVectorcall_Call,
+    .tp_getattro = get_attribute,
+    .tp_flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_VECTORCALL | Py_TPFLAGS_HAVE_GC,
+    .tp_traverse = traverse,
+    .tp_clear = clear,
+    .tp_methods = methods,
+    .tp_getset = attributes,
+};
+
+static PyMethodDef functions[] = {
+    {"function", make_function, METH_VARARGS, function_doc},
+    {NULL, NULL, 0, NULL},
+};
+
+static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "lie_codegen_call", NULL, -1, functions, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit_lie_codegen_call(void)
+{
+    import_array();
+    if (PyType_Ready(&FunctionType) < 0) {
+        return NULL;
+    }
+    out_word = PyUnicode_InternFromString("out");
+    return out_word == NULL ? NULL : PyModule_Create(&definition);
+}
