@@ -112,12 +112,11 @@ def _zero_space(algebra: LieAlgebra, inside: Subspace, elements: Sequence[Vector
 
 
 def _positive_eigenspaces(algebra: LieAlgebra, inside: Subspace, element: Vector) -> Subspace | None:
-    x = sp.Dummy("x")
     images = [bracket(algebra, element, vector) for vector in inside]
     table = [list(row) for row in zip(*inside, *images, strict=True)]
     rows = to_numbers(domain_matrix(table).rref()[0])[: len(inside)]
     matrix = sp.Matrix([row[len(inside) :] for row in rows])
-    roots = sp.roots(sp.Poly(matrix.charpoly(x).as_expr(), x), filter="Q")
+    roots = sp.Poly(matrix.charpoly().all_coeffs(), sp.Dummy()).ground_roots()
     if sum(roots.values()) != len(inside):
         return None
     found: list[Vector] = []
