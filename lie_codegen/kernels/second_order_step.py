@@ -19,9 +19,11 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.element_pattern import pack, packed_size, unpack
+from lie_codegen.kernels.exponential_map import exp_matrix
+from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import random_element
 from lie_codegen.kernels.kernel import Kernel, Port
-from lie_codegen.kernels.linear import Vector, bracket, plus, scaled
+from lie_codegen.kernels.linear import Vector, bracket, matmul, plus, scaled
 from lie_codegen.kernels.mechanics_kernels import acceleration_body
 from lie_codegen.kernels.reference_kernels import ReferenceBody
 from lie_codegen.kernels.rkmk import times_taylor_exp
@@ -83,12 +85,12 @@ def second_order_step(
         InputError: the inertia is not symmetric positive definite.
     """
     metric = positive_matrix(inertia, group.dim, "inertia")
-    size = packed_size(group)
+    size, move = packed_size(group), Move(group)
 
     def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar) -> tuple[Any, ...]:
         X, xi = unpack(group, state[:size]), list(state[size:])
-        Theta, change = increments(ops, group, metric, force, X, xi, t, h)
-        return ([*pack(group, times_taylor_exp(group, ops, X, Theta)), *plus(xi, change)],)
+        Theta, change = increments(ops, move, metric, force, X, xi, t, h)
+        return ([*pack(group, move(ops, X, Theta)), *plus(xi, change)],)
 
     data = WeiNormanData(group)
 
@@ -113,9 +115,22 @@ def second_order_step(
     )
 
 
+class Move:
+    """(ops, X, theta) -> X exp(hat(theta)): in closed form where the group has one, else by the Taylor polynomial."""
+
+    def __init__(self, group: MatrixGroup) -> None:
+        self.group = group
+        self.derivation = GroupDerivation(group)
+
+    def __call__(self, ops: Arithmetic, X: Any, theta: Vector) -> Any:
+        if self.derivation.matrix_pattern is None:
+            return times_taylor_exp(self.group, ops, X, theta)
+        return matmul(X, exp_matrix(ops, self.derivation, theta))
+
+
 def increments(
     ops: Arithmetic,
-    group: MatrixGroup,
+    move: Move,
     inertia: sp.MatrixBase,
     force: ForceBody | None,
     X: Any,
@@ -124,6 +139,7 @@ def increments(
     h: Scalar,
 ) -> tuple[Vector, Vector]:
     """Theta and the change of xi over a step."""
+    group = move.group
 
     def acceleration(time: Scalar, Y: Any, eta: Vector) -> Vector:
         applied = [0] * group.dim if force is None else force(ops, time, Y, eta)
@@ -138,11 +154,11 @@ def increments(
     half = h / 2
     k1, a1 = xi, acceleration(t, X, xi)
     theta, eta = scaled(half, k1), plus(xi, scaled(half, a1))
-    k2, a2 = pulled(theta, eta), acceleration(t + half, times_taylor_exp(group, ops, X, theta), eta)
+    k2, a2 = pulled(theta, eta), acceleration(t + half, move(ops, X, theta), eta)
     theta, eta = scaled(half, k2), plus(xi, scaled(half, a2))
-    k3, a3 = pulled(theta, eta), acceleration(t + half, times_taylor_exp(group, ops, X, theta), eta)
+    k3, a3 = pulled(theta, eta), acceleration(t + half, move(ops, X, theta), eta)
     theta, eta = scaled(h, k3), plus(xi, scaled(h, a3))
-    k4, a4 = pulled(theta, eta), acceleration(t + h, times_taylor_exp(group, ops, X, theta), eta)
+    k4, a4 = pulled(theta, eta), acceleration(t + h, move(ops, X, theta), eta)
     weights = ((k1, a1, 1), (k2, a2, 2), (k3, a3, 2), (k4, a4, 1))
     Theta = plus(*[scaled(h * w / 6, k) for k, _, w in weights])
     return Theta, plus(*[scaled(h * w / 6, a) for _, a, w in weights])
