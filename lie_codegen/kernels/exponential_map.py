@@ -9,16 +9,14 @@ Rossmann, Lie Groups (2002), 1.2, Theorem 5; Chirikjian, Stochastic Models, Info
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import Any
 
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernels.block_solve import add, is_zero, product, solve
+from lie_codegen.kernels.block_solve import is_zero, solve
 from lie_codegen.kernels.complex_scalar import Complex
-from lie_codegen.kernels.dense_functions import EvenOddExponentials, exponential, symmetric_nodes
 from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import real_rows
-from lie_codegen.kernels.linear import Matrix, Vector, dot, identity, matadd, matmul, number
+from lie_codegen.kernels.linear import Matrix, Vector, bracket, dot, identity, number
 from lie_codegen.kernels.matrix_function import (
     EXP,
     LEFT_JACOBIAN,
@@ -30,6 +28,12 @@ from lie_codegen.kernels.matrix_function import (
     MatrixFunction,
 )
 from lie_codegen.kernels.rkmk import hat_body
+from lie_codegen.kernels.spectral_functions import (
+    exponential,
+    inverse_jacobian_of_exp,
+    jacobian_of_exp,
+    plain_jacobian_of_exp,
+)
 
 _FUNCTIONS: dict[tuple[str, bool], MatrixFunction] = {
     ("left", False): LEFT_JACOBIAN,
@@ -43,7 +47,9 @@ def exp_matrix(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> l
     """exp(hat(x)); Complex entries for a complex group."""
     group = data.group
     if data.matrix_pattern is None:
-        return exponential(ops, hat_body(group, ops, x))
+        traceless = all(matrix.trace() == 0 for matrix in group.exact_basis)
+        A = hat_body(group, ops, x)
+        return exponential(ops, A, data.matrix_spectrum, unitary=data.is_unitary, traceless=traceless)
     d = group.degree
     function = FunctionOfMatrix(LinearFamily(ops, data.real.basis, x), data.matrix_pattern, EXP)
     columns = [function.column(j) for j in range(d)]
@@ -54,35 +60,34 @@ def exp_matrix(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> l
 
 def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: str, *, inverse: bool) -> Matrix:
     """(n, n) ljac or rjac of x, or its inverse; singular where ad x has an eigenvalue 2 pi i k, k != 0."""
+    if data.adjoint_pattern is None and data.adjoint_spectrum is not None:
+        function = inverse_jacobian_of_exp if inverse else jacobian_of_exp
+        return function(ops, ad_body(ops, data, x), data.adjoint_spectrum, 1 if side == "left" else -1)
     if data.adjoint_pattern is None:
-        return _by_quadrature(ops, data, [product(-1, c) for c in x] if side == "right" else x, inverse=inverse)
+        return _plain(ops, data, x, 1 if side == "left" else -1, inverse=inverse)
     family = LinearFamily(ops, data.ads, x)
-    function = FunctionOfMatrix(family, data.adjoint_pattern, _FUNCTIONS[side, inverse])
+    closed = FunctionOfMatrix(family, data.adjoint_pattern, _FUNCTIONS[side, inverse])
     n = data.group.dim
-    columns = [function.column(j) for j in range(n)]
+    columns = [closed.column(j) for j in range(n)]
     return [[column.get(i, 0) for column in columns] for i in range(n)]
 
 
-def _by_quadrature(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], *, inverse: bool) -> Matrix:
-    """ljac(x) = Ad(H) S with S = int_{-1/2}^{1/2} Ad(exp(s x)) ds and H = exp(x/2); the inverse is S^{-1} Ad(H^{-1})."""
-    n = data.group.dim
-    functions = EvenOddExponentials(ops, hat_body(data.group, ops, x))
-    even, odd = functions.cosh(Fraction(1, 2)), functions.sinh(Fraction(1, 2))
-    forward, backward = matadd(even, odd), matadd(even, odd, -1)
-    averaged = _averaged(ops, data, functions)
+def ad_body(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> Matrix:
+    """(n, n) the matrix of ad x."""
+    columns = [bracket(ops, data.group.algebra, x, unit) for unit in identity(data.group.dim)]
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _plain(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], sign: int, *, inverse: bool) -> Matrix:
+    """The Jacobian modulo the characteristic polynomial of ad; its inverse by blocks."""
+    traceless = all(matrix.trace() == 0 for matrix in data.ads)
+    J = plain_jacobian_of_exp(ops, ad_body(ops, data, x), traceless=traceless, sign=sign)
     if not inverse:
-        columns = [_conjugate(ops, data, forward, [row[j] for row in averaged], backward) for j in range(n)]
-        return [[column[i] for column in columns] for i in range(n)]
-    sides = [_conjugate(ops, data, backward, unit, forward) for unit in identity(n)]
-    sparse = {(i, j): value for i, row in enumerate(averaged) for j, value in enumerate(row) if not is_zero(value)}
-    right = [{i: value for i, value in enumerate(column) if not is_zero(value)} for column in sides]
-    columns = [[solution.get(i, 0) for i in range(n)] for solution in solve(ops, sparse, right, n)]
-    return [[column[i] for column in columns] for i in range(n)]
-
-
-def _conjugate(ops: Arithmetic, data: GroupDerivation, X: Matrix, x: Sequence[Scalar], X_inverse: Matrix) -> Vector:
-    """Coordinates of X hat(x) X^{-1}."""
-    return coordinates(ops, data, matmul(X, matmul(hat_body(data.group, ops, x), X_inverse)))
+        return J
+    n = data.group.dim
+    sparse = {(i, j): value for i, row in enumerate(J) for j, value in enumerate(row) if not is_zero(value)}
+    columns = solve(ops, sparse, [{j: 1} for j in range(n)], n)
+    return [[column.get(i, 0) for column in columns] for i in range(n)]
 
 
 def coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
@@ -93,38 +98,3 @@ def coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
 def real_coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
     """The x with hat(x) = A, for A in its real form."""
     return [dot([number(ops, c) for c in row.values()], [A[i][j] for i, j in row]) for row in data.real.coordinates]
-
-
-def _averaged(ops: Arithmetic, data: GroupDerivation, functions: EvenOddExponentials) -> Matrix:
-    """int_{-1/2}^{1/2} Ad(exp(s x)) ds: the pair +-s gives 2 (C B C - S B S) with C = cosh(s A), S = sinh(s A)."""
-    n, size = data.group.dim, data.real.size
-    pairs = []
-    for s, weight in symmetric_nodes():
-        even, odd = functions.cosh(s), functions.sinh(s)
-        if data.group.is_complex:
-            even, odd = real_rows(even), real_rows(odd)
-        pairs.append((ops.constant(2 * weight), even, odd))
-    kernel: dict[tuple[int, int], Scalar] = {}
-
-    def moved(first: int, second: int) -> Scalar:
-        """sum of weight (C C - S S) at two flat positions; symmetric in them."""
-        key = (min(first, second), max(first, second))
-        if key not in kernel:
-            (p, a), (b, q) = divmod(key[0], size), divmod(key[1], size)
-            total: Scalar = 0
-            for weight, even, odd in pairs:
-                value = add(product(even[p][a], even[b][q]), product(-1, product(odd[p][a], odd[b][q])))
-                total = add(total, product(weight, value))
-            kernel[key] = total
-        return kernel[key]
-
-    result: Matrix = [[0] * n for _ in range(n)]
-    for j, matrix in enumerate(data.real.basis):
-        entries = [(a, b, matrix[a, b]) for a in range(size) for b in range(size) if matrix[a, b] != 0]
-        for k, row in enumerate(data.real.coordinates):
-            total: Scalar = 0
-            for (p, q), c in row.items():
-                for a, b, value in entries:
-                    total = add(total, product(number(ops, c * value), moved(p * size + a, b * size + q)))
-            result[k][j] = total
-    return result

@@ -9,6 +9,7 @@ import sympy as sp
 
 from lie_codegen.algebra.adjoint import ad
 from lie_codegen.algebra.block_structure import diagonal_blocks
+from lie_codegen.algebra.even_spectrum import EvenSpectrum, even_spectrum
 from lie_codegen.algebra.spectral_pattern import ColumnPattern, spectral_pattern
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -70,3 +71,20 @@ class GroupDerivation:
         d = self.group.degree
         place = {i: b for b, block in enumerate(diagonal_blocks(self.group.exact_basis)) for i in block}
         return tuple(place[i % d] for i in range(self.real.size))
+
+    @cached_property
+    def matrix_spectrum(self) -> EvenSpectrum | None:
+        """Where the eigenvalues of hat(x) are +-lambda_i, equally often; None elsewhere and for complex matrices."""
+        return None if self.group.is_complex else even_spectrum(self.group.exact_basis)
+
+    @cached_property
+    def adjoint_spectrum(self) -> EvenSpectrum | None:
+        """The same of ad x."""
+        return even_spectrum(self.ads)
+
+    @cached_property
+    def is_unitary(self) -> bool:
+        """Whether the matrices of the group are complex and unitary."""
+        return self.group.is_complex and all(
+            (m + m.H).applyfunc(sp.expand).is_zero_matrix for m in self.group.exact_basis
+        )

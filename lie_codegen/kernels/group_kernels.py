@@ -22,7 +22,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels import wei_norman_body
 from lie_codegen.kernels.arithmetic import Arithmetic, FloatArithmetic, Scalar
-from lie_codegen.kernels.exponential_map import exp_matrix, jacobian
+from lie_codegen.kernels.exponential_map import ad_body, exp_matrix, jacobian
 from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import GroupMatrices, matrix_port
 from lie_codegen.kernels.kernel import Kernel, Port, Sampler
@@ -129,8 +129,7 @@ def _group_adjoint(data: GroupDerivation) -> Kernel:
 
 def _algebra_adjoint(data: GroupDerivation) -> Kernel:
     def body(ops: Arithmetic, x: Any) -> tuple[Any, ...]:
-        columns = [bracket(ops, data.group.algebra, x, unit) for unit in identity(data.group.dim)]
-        return ([list(row) for row in zip(*columns, strict=True)],)
+        return (ad_body(ops, data, x),)
 
     return _kernel(data, "ad", [_vector(data, "x")], [_square(data, "ad_x")], body, "ad_x y = [x, y]", "")
 

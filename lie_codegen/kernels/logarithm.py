@@ -7,7 +7,7 @@
    The error lies in ker T and its depth in the lower central series doubles, so finitely many steps are exact: one for
    SE(2), SE(3) and SE_2(3), where ker T is abelian; two for class 2 and 3.
 
-Where a block is of no known kind, inverse scaling and squaring of the whole matrix.
+Where a block is of no known kind, the whole matrix is taken: see `spectral_functions`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from fractions import Fraction
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, is_zero, product
 from lie_codegen.kernels.complex_scalar import Complex
-from lie_codegen.kernels.dense_functions import logarithm
 from lie_codegen.kernels.exponential_map import coordinates, exp_matrix, jacobian, real_coordinates
 from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import GroupMatrices
@@ -33,13 +32,17 @@ from lie_codegen.kernels.log_blocks import (
 )
 from lie_codegen.kernels.log_structure import LogBlock, LogStructure
 from lie_codegen.kernels.matrix_function import RIGHT_JACOBIAN_INVERSE, FunctionOfMatrix, LinearFamily
+from lie_codegen.kernels.spectral_functions import logarithm
 
 
 def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Entries) -> Vector:
     """The x with exp(hat(x)) = X."""
     structure = data.log_structure
     if structure is None:
-        return coordinates(ops, data, logarithm(ops, X))
+        matrices = GroupMatrices(ops, data.real)
+        X_inverse = matrices.write(matrices.inverse(matrices.read(X)))
+        A = logarithm(ops, X, X_inverse, data.matrix_spectrum, unitary=data.is_unitary)
+        return coordinates(ops, data, A)
     logs = [value for block in structure.blocks for value in block_log(ops, block, X)]
     x: Vector = [0] * data.group.dim
     for i, weights in structure.section:
