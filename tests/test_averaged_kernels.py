@@ -127,5 +127,5 @@ def test_feedback_refusals() -> None:
         feedback_average(so3, ["exp(cos(t))*g1", "0", "0"])
     with pytest.raises(InputError, match="not an equilibrium"):
         feedback_average(so3, ["1", "0", "0"]).linearise([0, 0, 0])
-    with pytest.raises(InputError, match="k1.*no values"):
+    with pytest.raises(InputError, match=r"k1.*no values"):
         feedback_average(so3, FEEDBACK, parameters=("k1", "k2", "k3")).linearise([0, 0, 0])
