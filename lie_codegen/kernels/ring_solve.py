@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from lie_codegen.kernels.block_solve import SparseMatrix, blocks_of
+from lie_codegen.kernels.ring_fractions import fraction
 from lie_codegen.kernels.trigonometric_ring import Element, TrigonometricRing
 
 #: Numerator and denominator.
@@ -67,7 +68,7 @@ def inverse_rows(ring: TrigonometricRing, matrix: SparseMatrix, size: int) -> li
                 residual.append(((denominator if i == column else zero) - numerator, denominator))
             for i, row in zip(block, cofactors, strict=True):
                 numerator, denominator = combination(ring, row, residual)
-                rows[i][column] = ring.fraction(numerator, ring.reduce(denominator * det))
+                rows[i][column] = fraction(ring, numerator, ring.reduce(denominator * det))
         solved += block
     return rows
 
@@ -85,5 +86,5 @@ def combination(ring: TrigonometricRing, row: Sequence[Element], fractions: Sequ
             numerator = numerator + ring.reduce(term * denominator)
         else:
             total = ring.reduce(numerator * below + term * denominator)
-            numerator, denominator = ring.fraction(total, ring.reduce(denominator * below))
+            numerator, denominator = fraction(ring, total, ring.reduce(denominator * below))
     return numerator, denominator

@@ -19,6 +19,8 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic
 from lie_codegen.kernels.block_solve import SparseMatrix, blocks_of
 from lie_codegen.kernels.exponential_entries import ExponentialEntries
+from lie_codegen.kernels.ring_factors import factors as factors_of
+from lie_codegen.kernels.ring_fractions import quotient
 from lie_codegen.kernels.ring_solve import combination, dense, determinant, inverse_rows
 from lie_codegen.kernels.trigonometric_ring import Element, TrigonometricRing
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, times_vector
@@ -60,7 +62,7 @@ class WeiNorman:
         traces = (ad(self.group.algebra, k).trace() * self.g[k] for k in range(self._middle, n))
         unit = sp.Mul(*(sp.exp(-trace) for trace in traces))
         for block in blocks_of(self._frame, n):
-            block_unit, factors = ring.factors(determinant(ring, dense(ring, self._frame, block, block)))
+            block_unit, factors = factors_of(ring, determinant(ring, dense(ring, self._frame, block, block)))
             unit *= block_unit
             for factor, multiplicity in factors:
                 powers[factor] = powers.get(factor, 0) + multiplicity
@@ -75,7 +77,7 @@ class WeiNorman:
         for i in range(n):
             for j in range(n):
                 column = [self._rotation.get((k, j), ring.ring.zero) for k in range(n)]
-                entries.append(ring.quotient(*combination(ring, column, inverse[i])))
+                entries.append(quotient(ring, *combination(ring, column, inverse[i])))
         return sp.ImmutableMatrix(n, n, entries)
 
     @cached_property
