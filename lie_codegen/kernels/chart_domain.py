@@ -19,6 +19,7 @@ class ChartDomain:
     Attributes:
         determinant: det M^{-1}, factored.
         walls: the factors that vanish somewhere, positive or negative on the chart as at g = 0.
+        wall_texts: the side of each wall on which the chart lies, as in "|g2| < pi/2".
         end: how a solution can leave the chart; "never" is a global chart.
         text: the domain in words.
         reason: why.
@@ -26,6 +27,7 @@ class ChartDomain:
 
     determinant: sp.Expr
     walls: tuple[sp.Expr, ...]
+    wall_texts: tuple[str, ...]
     end: End
     text: str
     reason: str
@@ -43,7 +45,8 @@ def chart_domain(group: MatrixGroup) -> ChartDomain:
     walls = tuple(factor for factor, _ in factors if not _positive(factor))
     end, reason = chart_end(group, bool(walls))
     witness = escaping_input(group) if end == "escape" else None
-    return ChartDomain(wn.determinant, walls, end, _text(wn, walls, end, witness), reason)
+    sides = tuple(_wall_text(wn, wall) for wall in walls)
+    return ChartDomain(wn.determinant, walls, sides, end, _text(wn, sides, end, witness), reason)
 
 
 def _positive(factor: sp.Expr) -> bool:
@@ -51,14 +54,14 @@ def _positive(factor: sp.Expr) -> bool:
     return factor.xreplace(real).is_positive is True
 
 
-def _text(wn: WeiNorman, walls: Sequence[sp.Expr], end: End, witness: str | None) -> str:
-    if not walls:
+def _text(wn: WeiNorman, sides: Sequence[str], end: End, witness: str | None) -> str:
+    if not sides:
         start = f"det M^-1 = {wn.determinant} never vanishes"
         if end == "never":
             return f"all of R^{wn.group.dim}: {start}, and coordinates exist for all time"
         how = "may escape" if witness is None else f"escape (under the constant input {witness} for instance)"
         return f"{start} on R^{wn.group.dim}, yet solutions {how} to infinity in finite time: not a global chart"
-    inside = "; ".join(_wall_text(wn, wall) for wall in walls)
+    inside = "; ".join(sides)
     tail = "" if end == "walls" else ", if no solution escapes in finite time before"
     return f"{inside}{tail}"
 
