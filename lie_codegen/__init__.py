@@ -32,6 +32,9 @@ _FRONT_DOOR = {
     "elliptic_kernels": "lie_codegen.kernels.elliptic_kernels",
     "free_rigid_body": "lie_codegen.studies.rigid_body",
     "euler_average": "lie_codegen.studies.euler_average",
+    "lagrangian_system": "lie_codegen.mechanics.lagrangian",
+    "routh_reduce": "lie_codegen.mechanics.routh",
+    "vibrational_average": "lie_codegen.studies.vibrational",
 }
 
 __all__ = ["__version__", "errors", *_FRONT_DOOR]

@@ -47,7 +47,7 @@ class EulerPerturbation:
         """(g_1, g_2, g_3) along the paper's axes at the given vectors along the paper's axes."""
         values = dict(zip(_RATES, self.body.to_user(omega), strict=True))
         values.update(zip(_ACCELERATIONS, self.body.to_user(acceleration), strict=True))
-        return [sp.sympify(g) for g in self.body.to_paper([term.xreplace(values) for term in self.terms])]
+        return list(self.body.to_paper([term.xreplace(values) for term in self.terms]))
 
     @cached_property
     def unperturbed(self) -> list[sp.Expr]:
