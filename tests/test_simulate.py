@@ -88,10 +88,43 @@ def test_breakpoints_are_stepped_on_exactly() -> None:
     assert run.steps < 5000
 
 
+@pytest.mark.parametrize("name", ["so3", "su2", "sl2", "se3", "se2"])
+def test_restarted_charts_cover_a_long_trajectory(name: str) -> None:
+    group = lc.group(name)
+    rng = np.random.default_rng(7)
+    a, b = rng.normal(size=(2, group.dim))
+    if name == "sl2":
+        a, b = np.array([0.0, 1.0, -1.0]), 0.2 * b
+    run = lc.simulate(group, lambda t: a + b * np.sin(1.3 * t), t=np.linspace(0, 10, 101))
+    charts = run.charts
+    assert charts[0].start == 0.0
+    assert charts[-1].end == 10.0
+    assert charts[-1].reason == "end"
+    assert len(charts) > 1 or name == "se2"
+    seen = 0
+    for chart, after in zip(charts, [*charts[1:], None], strict=True):
+        assert after is None or after.start == chart.end
+        for t, g in zip(chart.t, chart.g, strict=True):
+            product = chart.origin
+            for coordinate, matrix in zip(g, group.basis, strict=True):
+                product = product @ expm(coordinate * matrix)
+            X = run.X[np.argmin(np.abs(run.t - t))]
+            np.testing.assert_allclose(product, X, rtol=0, atol=1e-9 * max(1, np.abs(X).max()))
+            seen += 1
+    assert seen >= len(run.t)
+
+
+def test_a_global_chart_is_never_restarted() -> None:
+    h3 = lc.group("h3")
+    run = lc.simulate(h3, lambda t: np.array([np.cos(t), np.sin(t), 0.1]), t=np.linspace(0, 20, 21))
+    assert [chart.reason for chart in run.charts] == ["end"]
+    np.testing.assert_allclose(run.charts[0].g, run.g, rtol=0, atol=1e-12)
+
+
 def test_finite_escape_is_an_error_too() -> None:
     sl2 = lc.group("sl2")
     run = lc.simulate(sl2, [0.0, 1.0, -1.0], t=np.linspace(0, 2, 41))
-    with pytest.raises(ChartError, match=r"t = 1\.5"):
+    with pytest.raises(ChartError, match=r"t = 1\.5.*never vanishes.*escape"):
         _ = run.g
     t = 1.5
     g = lc.simulate(sl2, [0.0, 1.0, -1.0], t=[0.0, t]).g[-1]

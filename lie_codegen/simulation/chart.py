@@ -17,6 +17,7 @@ Array = NDArray[Any]
 _AGREEMENT = 1e-9
 #: log det M above which the chart's edge is reached to rounding.
 _EDGE = 32.0
+_SMALL = 6
 
 
 def follow_chart(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], X: Array) -> Array:
@@ -38,10 +39,19 @@ def follow_chart(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Ar
         last, first = grid.knots[grid.at[max(bad[0] - 1, 0)]], grid.knots[grid.at[bad[0]]]
         raise ChartError(
             f"{group.name}: the Wei-Norman chart in the order {', '.join(group.labels)} ends between t = {last:.6g} "
-            f"and t = {first:.6g}; the trajectory itself (.X) is right; restart the coordinates before that time "
-            "or reorder the basis"
+            f"and t = {first:.6g}{_why(group)}; the trajectory itself (.X) is right, and .charts restarts the "
+            "coordinates before they end; or reorder the basis"
         )
     return g
+
+
+def _why(group: MatrixGroup) -> str:
+    """A vanishing determinant told apart from an escape in finite time, where the exact domain is quickly derived."""
+    if group.dim > _SMALL:
+        return ""
+    from lie_codegen.kernels.chart_domain import chart_domain
+
+    return f" ({chart_domain(group).text})"
 
 
 def _inside(group: MatrixGroup, g: Array) -> Array:

@@ -15,6 +15,7 @@ from lie_codegen.simulation.chart import follow_chart
 from lie_codegen.simulation.grid import Grid, refine, sample
 from lie_codegen.simulation.inputs import Signal, as_signal
 from lie_codegen.simulation.libraries import integrators
+from lie_codegen.simulation.restarts import Chart, restarted_charts
 
 Array = NDArray[Any]
 
@@ -33,6 +34,7 @@ class Trajectory:
         error_estimate: difference to the run with half the steps, over 15 (Richardson).
         g: (k, n) Wei-Norman coordinates with X = X0 exp(g_1 A_1) ... exp(g_n A_n), from g = 0 at t[0]; raises
             ChartError, naming the time, if the chart ends on the way.
+        charts: the same with restarts: charts that cover the whole trajectory, see `restarts.Chart`.
     """
 
     group: MatrixGroup
@@ -49,6 +51,13 @@ class Trajectory:
         """(k, n) Wei-Norman coordinates; see the class."""
         u0, um, u1 = sample(self._u, self._grid, self._eps)
         return follow_chart(self.group, self._grid, (u0, um, u1), self.X)
+
+    @cached_property
+    def charts(self) -> tuple[Chart, ...]:
+        """Wei-Norman charts that cover the trajectory, each restarted before the last one ends."""
+        samples = sample(self._u, self._grid, self._eps)
+        states = _states(self.group, self._grid, samples, self.X[0])
+        return restarted_charts(self.group, self._grid, samples, states)
 
 
 def simulate(
@@ -99,13 +108,18 @@ def simulate(
 
 
 def _run(group: MatrixGroup, grid: Grid, signal: Signal, eps: float, start: Array) -> Array:
-    u0, um, u1 = sample(signal, grid, eps)
-    for values in (u0, um, u1):
+    samples = sample(signal, grid, eps)
+    for values in samples:
         if not np.all(np.isfinite(values)):
             raise NotFiniteError(f"simulate({group.name}): u(t) is NaN or infinite at some t")
-    step = integrators(group).rkmk4_step
-    states = step.scan(start, n=grid.steps, every=1, u0=u0, um=um, u1=u1, h=grid.h)
-    return np.asarray(states)[grid.outputs]
+    return _states(group, grid, samples, start)[grid.outputs]
+
+
+def _states(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], start: Array) -> Array:
+    """(steps + 1, d, d) the flow at every step."""
+    u0, um, u1 = samples
+    states = integrators(group).rkmk4_step.scan(start, n=grid.steps, every=1, u0=u0, um=um, u1=u1, h=grid.h)
+    return np.asarray(states)
 
 
 def _check_times(group: MatrixGroup, t: ArrayLike) -> Array:
