@@ -92,9 +92,8 @@ def test_breakpoints_are_stepped_on_exactly() -> None:
 def test_restarted_charts_cover_a_long_trajectory(name: str) -> None:
     group = lc.group(name)
     rng = np.random.default_rng(7)
-    a, b = rng.normal(size=(2, group.dim))
-    if name == "sl2":
-        a, b = np.array([0.0, 1.0, -1.0]), 0.2 * b
+    a = np.array([0.0, 1.0, -1.0]) if name == "sl2" else np.linspace(0.5, 1.5, group.dim)
+    b = 0.2 * rng.normal(size=group.dim)
     run = lc.simulate(group, lambda t: a + b * np.sin(1.3 * t), t=np.linspace(0, 10, 101))
     charts = run.charts
     assert charts[0].start == 0.0
