@@ -12,11 +12,12 @@ order alone:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import sympy as sp
 
+from lie_codegen.algebra.exact import Number
 from lie_codegen.algebra.ideal_chain import is_chain_order, is_ideal, is_subalgebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.structure import structure
@@ -130,7 +131,7 @@ def escaping_input(group: MatrixGroup) -> str | None:
     for vector in decomposition.k if decomposition is not None else ():
         pair = [i for i, value in enumerate(vector) if value != 0]
         if len(pair) == 2 and _is_sl2_pair(algebra, pair[0], pair[1]):
-            return str(sum(vector[i] * sp.Symbol(algebra.labels[i]) for i in pair))
+            return combination_text({algebra.labels[i]: vector[i] for i in pair})
     return None
 
 
@@ -141,3 +142,14 @@ def _is_sl2_pair(algebra: LieAlgebra, i: int, j: int) -> bool:
     if len(found) != 1 or found[0] in (i, j):
         return False
     return all(list(algebra.bracket({found[0]: one}, {k: one})) == [k] for k in (i, j))
+
+
+def combination_text(combination: Mapping[str, Number]) -> str:
+    """A linear combination as it is written, in the order given: e - f, 1/2 a + sqrt(3) b."""
+    text = ""
+    for label, value in combination.items():
+        negative = value.could_extract_minus_sign()
+        size = -value if negative else value
+        term = label if size == 1 else f"{size} {label}" if size.is_Atom else f"({size}) {label}"
+        text += (" - " if negative else " + ") + term
+    return text.removeprefix(" + ").replace(" - ", "-", 1) if text.startswith(" - ") else text.removeprefix(" + ")

@@ -16,6 +16,7 @@ from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.chart_domain import ChartDomain, chart_domain
+from lie_codegen.kernels.chart_end import combination_text
 
 _RANK = {"never": 0, "walls": 1, "either": 2, "escape": 3}
 #: Up to this dimension every order is tried.
@@ -162,10 +163,7 @@ def _reason(
     if combinations is None or changed is None:
         return text
     basis = ", ".join(
-        label if dict(row) == {label: 1} else f"{label} = {_combination(row)}" for label, row in combinations.items()
+        label if dict(row) == {label: 1} else f"{label} = {combination_text(row)}"
+        for label, row in combinations.items()
     )
     return f"{text}. With the basis {basis}: {changed.text}; {changed.reason}"
-
-
-def _combination(row: Mapping[str, Number]) -> str:
-    return str(sp.Add(*(value * sp.Symbol(label) for label, value in row.items())))

@@ -1,0 +1,12 @@
+"""lc.structure: what the algebra of a group is made of."""
+
+from __future__ import annotations
+
+from lie_codegen.algebra.structure import Structure
+from lie_codegen.algebra.structure import structure as algebra_structure
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+
+def structure(group: MatrixGroup) -> Structure:
+    """Killing form, series, centre, radical and Levi subalgebra of the group's algebra; each computed when first read."""
+    return algebra_structure(group.algebra)
