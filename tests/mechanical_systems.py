@@ -42,3 +42,13 @@ def dumbbell(momentum="p"):
         coordinates=("rho", "th", "nu"), lagrangian=DUMBBELL, forces={"th": "2*e*u"}, parameters={"e": "0.05"}
     )
     return routh_reduce(full, momentum={"nu": momentum})
+
+
+def spherical():
+    """A spherical pendulum on a vertically shaken pivot: two degrees of freedom, the azimuth cyclic."""
+    return lagrangian_system(
+        coordinates=("th", "ph"),
+        lagrangian="m*l^2*(dth^2 + sin(th)^2*dph^2)/2 - m*g*l*cos(th)",
+        forces={"th": "m*l*sin(th)*u"},
+        parameters={"m": 1, "l": 1, "g": 9.81},
+    )
