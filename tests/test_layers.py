@@ -109,3 +109,13 @@ def test_no_forbidden_construct_in_the_package() -> None:
                     f"{called} in {path}"
                 )
                 assert not called.endswith("parse_expr"), f"{called} in {path}"
+
+
+def test_every_gallery_target_is_a_function_with_a_docstring() -> None:
+    from importlib import import_module
+
+    from lie_codegen.gallery.registry import TARGETS
+
+    for target in TARGETS:
+        function = getattr(import_module(f"lie_codegen.gallery.{target.module}"), target.name)
+        assert function.__doc__, target.name

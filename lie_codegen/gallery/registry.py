@@ -14,14 +14,40 @@ from lie_codegen.gallery.result import GalleryResult
 
 @dataclass(frozen=True)
 class Target:
-    """A figure that `lie-codegen reproduce NAME` makes."""
+    """A figure that `lie-codegen reproduce NAME` makes: the function `name` of gallery module `module`."""
 
     name: str
     module: str
     about: str
 
 
-TARGETS = (Target("satellite", "lie_codegen.gallery.satellite", "TR 93-59, Figures 2 and 3: two-wheel satellite"),)
+_FOLDER = "lie_codegen.gallery"
+TARGETS = (
+    Target("satellite", "satellite", "TR 93-59, Figures 2 and 3: two wheels, three axes"),
+    Target(
+        "periodic_controls",
+        "leonard_periodic_controls",
+        "TR 93-59, Figure 1: periodic controls and the areas of their loops",
+    ),
+    Target("momentum_wheels", "leonard_momentum_wheels", "TR 93-59, Figure 4: momentum wheels at any axes"),
+    Target(
+        "point_mass_oscillator",
+        "leonard_oscillator",
+        "TR 93-59, Figure 5: a point-mass oscillator and the drift it causes",
+    ),
+    Target("averaging_orders", "leonard_orders", "every form of average, its order measured; the erratum of (45)-(46)"),
+    Target("averaging_growth", "leonard_growth", "what exact averages cost, against order and harmonics"),
+    Target("attitude_trajectory", "attitude_trajectory", "Geyer, Figure 1: the second-order attitude law"),
+    Target("attitude_region", "attitude_region", "10^4 initial states of the satellite law beside the proved region"),
+    Target(
+        "tracking_sphere", "tracking_sphere", "Bullo and Murray, Figures 1 and 2: charts and transport on the sphere"
+    ),
+    Target(
+        "tracking_rotations", "tracking_rotations", "Bullo and Murray, Figures 3 and 4: left and right velocity errors"
+    ),
+    Target("tracking_planar_flows", "tracking_planar_flows", "Bullo and Murray, Figure 5: gradient flows on SE(2)"),
+    Target("tracking_rows", "tracking_rows", "Bullo and Murray, Table 1: six error functions, one vehicle"),
+)
 
 
 def target(name: str) -> Target:
@@ -39,6 +65,6 @@ def target(name: str) -> Target:
 def reproduce(name: str, folder: Path, progress: Callable[[str], None]) -> GalleryResult:
     """Runs a target; its picture and numbers are written to the folder."""
     chosen = target(name)
-    function: Any = getattr(import_module(chosen.module), name)
+    function: Any = getattr(import_module(f"lie_codegen.gallery.{chosen.module}"), name)
     result: GalleryResult = function(folder, progress)
     return result
