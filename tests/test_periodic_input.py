@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import quad
+from scipy.linalg import expm
 
+import lie_codegen as lc
+from lie_codegen.averaging.areas import areas
 from lie_codegen.averaging.coefficients import CoefficientRing
 from lie_codegen.averaging.periodic_input import TIME, PeriodicInput
-from lie_codegen.errors import ExpressionError, InputError, NotFiniteError, PeriodError, ShapeError
+from lie_codegen.errors import AssumptionWarning, ExpressionError, InputError, NotFiniteError, PeriodError, ShapeError
+from lie_codegen.studies.reference_flow import reference_flow
 
 TEXTS = ["cos(t)^3*sin(2*t) + 1/7", "sqrt(2)*cos(2*t + pi/4)^2", "cos(t + 1)*sin(t - 3/10)", "0", "pi*sin(3*t) - 1/2"]
 
@@ -112,6 +116,9 @@ def test_fourier_coefficients_and_samples() -> None:
     k = np.arange(1, 4)
     angle = 2 * np.pi * k * 0.41 / 3
     np.testing.assert_allclose(u(0.41), m + np.cos(angle) @ a + np.sin(angle) @ b, atol=1e-14)
+    rate = (2 * np.pi * k / 3)[:, None]
+    primitive = 0.41 * m + np.sin(angle) @ (a / rate) + (1 - np.cos(angle)) @ (b / rate)
+    np.testing.assert_allclose(u.integral(0.41), primitive, atol=1e-14)
     for count in (5, 6):
         samples = rng.normal(size=(count, 2))
         through = PeriodicInput.from_samples(samples, "2*pi")
@@ -122,12 +129,63 @@ def test_fourier_coefficients_and_samples() -> None:
         PeriodicInput.from_samples([[np.nan], [0.0]], 1)
 
 
-def test_pieces_start_anew_and_repeat() -> None:
+def test_pieces_start_anew_and_repeat_and_stay_exact() -> None:
     square = PeriodicInput.from_pieces([(1, ["1", "0"]), (2, ["0", "t"]), (4, ["-1/2", "-3/4"])])
-    np.testing.assert_allclose(square.mean, [0.0, 0.0], atol=1e-15)
+    assert square.exact
+    assert square.zero_mean
     np.testing.assert_allclose(square([0.5, 1.5, 3.0, 4.5]), [[1, 0], [0, 1.5], [-0.5, -0.75], [1, 0]])
     assert square.breakpoints == (1.0, 2.0)
     assert square.integral(1.5)[1] == pytest.approx((1.5**2 - 1) / 2, abs=1e-14)
+    mixed = PeriodicInput.from_pieces([("pi", ["t*cos(2*t)", "A*t^2"]), ("2*pi", ["sin(t)", "-A"])], parameters=("A",))
+    A = sp.Symbol("A", real=True)
+    assert list(mixed.exact_mean) == [-1 / sp.pi, sp.expand(A * sp.pi**2 / 6 - A / 2)]
+    assert not PeriodicInput.from_pieces([(1, ["exp(t)"]), (2, ["0"])]).exact
+    with pytest.raises(InputError, match="must increase"):
+        PeriodicInput.from_pieces([(1, ["1"]), (1, ["0"])])
+    with pytest.raises(InputError, match="commensurate"):
+        PeriodicInput.from_pieces([(1, ["a*exp(t)"]), (2, ["0"])], parameters=("a",))
+
+
+def manoeuvre() -> PeriodicInput:
+    """(62)-(63) of TR 93-59 with the numbers of section 5.2, as eps u."""
+    half = "pi/2"
+    return PeriodicInput.from_pieces(
+        [
+            (1, [f"1/10*{half}*sin({half}*t)", f"1/20*{half}*sin({half}*t)", "0"]),
+            (21, [f"1/10*{half}*cos({half}*(t - 1))", f"1/20*sqrt(2)*{half}*cos({half}*(t - 1) - pi/4)", "0"]),
+            (22, [f"1/10*{half}*cos({half}*(t - 21))", f"1/20*{half}*cos({half}*(t - 21))", "0"]),
+            (24, [f"-1/20*{half}*sin({half}*(t - 22))", f"-1/40*{half}*sin({half}*(t - 22))", "0"]),
+        ]
+    )
+
+
+def test_the_manoeuvre_of_section_5_2_exactly() -> None:
+    u = manoeuvre()
+    assert u.exact
+    assert list(24 * u.exact_mean) == [sp.Rational(1, 10), sp.Rational(1, 20), 0]
+    np.testing.assert_allclose(u.integral([1.0, 21.0, 22.0, 24.0])[:, 0], [0.1, 0.1, 0.2, 0.1], atol=1e-14)
+    assert areas(u)[0, 1] == sp.pi / 40
+    flow = reference_flow(lc.group("so3"), u, 1.0, 24.0)
+    final = flow.X[int(np.argmax(flow.t))]
+    g = [0.1039897509848151, 0.0500527635748268, 0.0755999303251700]
+    expected = np.linalg.multi_dot([expm(x * A) for x, A in zip(g, lc.group("so3").basis, strict=True)])
+    np.testing.assert_allclose(final, expected, atol=1e-12)
+
+
+def test_pieces_and_quadrature_give_the_same_averages() -> None:
+    group = lc.group("sl2")
+    pieces = [("pi", ["t/3", "t*cos(2*t)", "1/2"]), ("2*pi", ["(2*pi - t)/3", "-cos(2*t + 1)", "-1/2"])]
+    exact = PeriodicInput.from_pieces(pieces)
+    sampled = PeriodicInput.from_callable(exact, exact.period, breakpoints=exact.breakpoints)
+    with pytest.warns(AssumptionWarning):
+        a, b = lc.average(group, exact, 4), lc.average(group, sampled, 4)
+    for x, y in zip(a.F, b.F, strict=True):
+        np.testing.assert_allclose(x, y, atol=1e-13)
+    np.testing.assert_allclose(a.areas, b.areas, atol=1e-13)
+    np.testing.assert_allclose(a.moments, b.moments, atol=1e-12)
+    np.testing.assert_allclose(a.state(0.1, [2.0, 9.0]), b.state(0.1, [2.0, 9.0]), atol=1e-13)
+    with pytest.warns(AssumptionWarning):
+        assert lc.order_check(group, exact, 3, horizon=1.5).passed
 
 
 def test_linear_images_are_exact() -> None:

@@ -52,6 +52,12 @@ class CoefficientRing:
         }
 
     @cached_property
+    def inverses(self) -> tuple[tuple[int, int], ...]:
+        """Positions of generators g and 1/g that are both present; their product is 1."""
+        place = {g: k for k, g in enumerate(self.generators)}
+        return tuple((k, place[1 / g]) for g, k in place.items() if 1 / g in place and k < place[1 / g])
+
+    @cached_property
     def polynomials(self) -> PolyRing:
         """The polynomial ring over Z; its generators are named x0, x1, ..."""
         return PolyRing([f"x{k}" for k in range(len(self.generators))], ZZ)
@@ -59,13 +65,12 @@ class CoefficientRing:
     @cached_property
     def multiply(self) -> Callable[[Coefficient, Coefficient], Coefficient]:
         """The product, reduced."""
-        if not self.squares:
+        if not self.squares and not self.inverses:
             return lambda a, b: a * b
-        squares = tuple(self.squares.items())
 
         def product(a: Coefficient, b: Coefficient) -> Coefficient:
             value = a * b
-            return value if isinstance(value, int) else _reduced(value, squares)
+            return value if isinstance(value, int) else self._reduced(value)
 
         return product
 
@@ -81,7 +86,7 @@ class CoefficientRing:
         image = _convert(value, rational, self._images)
         denominator, cleared = image.clear_denoms()
         numerator = self.polynomials.from_dict({monom: int(c) for monom, c in cleared.terms()})
-        return _reduced(numerator, tuple(self.squares.items())), int(denominator)
+        return self._reduced(numerator), int(denominator)
 
     def constant(self, value: int) -> Coefficient:
         """An integer as an element."""
@@ -120,6 +125,16 @@ class CoefficientRing:
         """Exact division by an integer that divides the content."""
         return value // divisor if isinstance(value, int) else value.quo_ground(ZZ(divisor))
 
+    def _reduced(self, value: Any) -> Any:
+        """Even powers of square roots replaced by integers, g and 1/g cancelled."""
+        for position, square in self.squares.items():
+            if any(monom[position] > 1 for monom in value):
+                value = _rewritten(value, lambda m, k=position, n=square: _square(m, k, n))  # type: ignore[misc]
+        for first, second in self.inverses:
+            if any(monom[first] and monom[second] for monom in value):
+                value = _rewritten(value, lambda m, k=first, n=second: _cancel(m, k, n))  # type: ignore[misc]
+        return value
+
     @cached_property
     def _rationals(self) -> PolyRing:
         return PolyRing([f"x{k}" for k in range(len(self.generators))], QQ)
@@ -129,17 +144,29 @@ class CoefficientRing:
         return dict(zip(self.generators, self._rationals.gens, strict=True))
 
 
-def _reduced(value: Any, squares: tuple[tuple[int, int], ...]) -> Any:
-    """Even powers of square roots replaced by integers."""
-    for position, square in squares:
-        if any(monom[position] > 1 for monom in value):
-            result: dict[tuple[int, ...], int] = {}
-            for monom, coefficient in value.items():
-                half, odd = divmod(monom[position], 2)
-                key = (*monom[:position], odd, *monom[position + 1 :])
-                result[key] = result.get(key, 0) + coefficient * square**half
-            value = value.ring.from_dict({key: c for key, c in result.items() if c})
-    return value
+Monomial = tuple[int, ...]
+
+
+def _rewritten(value: Any, rule: Callable[[Monomial], tuple[Monomial, int]]) -> Any:
+    """A polynomial with each monomial replaced by a multiple of another."""
+    result: dict[Monomial, int] = {}
+    for monom, coefficient in value.items():
+        key, factor = rule(monom)
+        result[key] = result.get(key, 0) + coefficient * factor
+    return value.ring.from_dict({key: c for key, c in result.items() if c})
+
+
+def _square(monom: Monomial, position: int, square: int) -> tuple[Monomial, int]:
+    half, odd = divmod(monom[position], 2)
+    return (*monom[:position], odd, *monom[position + 1 :]), square**half
+
+
+def _cancel(monom: Monomial, first: int, second: int) -> tuple[Monomial, int]:
+    common = min(monom[first], monom[second])
+    key = list(monom)
+    key[first] -= common
+    key[second] -= common
+    return tuple(key), 1
 
 
 def _root_factors(value: sp.Expr) -> tuple[sp.Rational, list[sp.Expr]]:

@@ -88,8 +88,8 @@ def magnus(group: MatrixGroup, u: PeriodicInput, order: int) -> Magnus:
         raise InputError(f"magnus: order must be an integer from 1 to {_MOST}, got {order!r}")
     if u.dim != group.dim:
         raise ShapeError(f"magnus: u has {u.dim} components, {group.name} has {group.dim}: {', '.join(group.labels)}")
-    if not u.exact:
-        raise InputError("magnus: the input is sampled; the Magnus series needs sums of sines and cosines")
+    if not u.waveform.has_formula:
+        raise InputError("magnus: the input has no one formula; the Magnus series needs sums of sines and cosines")
     calculus, signal = u.waveform.calculus(group.algebra.table, group.dim)
     weights = [abs(b) / factorial(k) if k == 1 else b / factorial(k) for k, b in enumerate(bernoulli(order + 1))]
     found: list[Any] = []

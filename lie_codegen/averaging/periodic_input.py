@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.algebra.exact import exact_number
 from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.averaging.piecewise_waveform import piecewise_waveform
 from lie_codegen.averaging.sampled_signal import resolve
 from lie_codegen.averaging.trig_formula import NotTrigonometricError, trig_form
 from lie_codegen.averaging.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
@@ -45,10 +46,10 @@ class PeriodicInput:
         InputError: no component, an undeclared symbol.
     """
 
-    components: tuple[Any, ...]
+    components: Sequence[Any]
     period: Any = None
-    parameters: tuple[str, ...] = ()
-    breakpoints: tuple[float, ...] = ()
+    parameters: Sequence[str] = ()
+    breakpoints: Sequence[float] = ()
     waveform: Waveform = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -134,31 +135,47 @@ class PeriodicInput:
         return PeriodicInput.from_fourier(cosines, sines, mean=spectrum[0].real, period=period)
 
     @staticmethod
-    def from_pieces(pieces: Sequence[tuple[Any, Sequence[Any]]]) -> PeriodicInput:
+    def from_pieces(pieces: Sequence[tuple[Any, Sequence[Any]]], *, parameters: Sequence[str] = ()) -> PeriodicInput:
         """Formulas valid on successive intervals: [(t_1, formulas on [0, t_1)), .., (T, formulas on [t_{m-1}, T))].
 
-        Each formula is in the time t of the whole period. The moments are by quadrature, exact to rounding.
+        Each formula is in the time t of the whole period. Polynomials in t with sines and cosines of commensurate rates
+        stay exact, such as (62)-(63) of TR 93-59; others are taken by their values.
 
         Raises:
             InputError: if the ends do not increase from 0, or a formula is not understood.
+            ShapeError: if the pieces differ in the number of components.
         """
-        ends = [float(_number(end, "the end of a piece", {})) for end, _ in pieces]
-        if not ends or any(b <= a for a, b in zip([0.0, *ends], ends, strict=False)):
-            raise InputError(f"PeriodicInput.from_pieces: the ends {ends} must increase from above 0")
-        formulas = [[_formula(entry, {}) for entry in entries] for _, entries in pieces]
+        symbols = {name: _symbol(name) for name in parameters}
+        ends = [_number(end, "the end of a piece", {}) for end, _ in pieces]
+        moments = [float(end) for end in ends]
+        if not ends or any(b <= a for a, b in zip([0.0, *moments], moments, strict=False)):
+            raise InputError(f"PeriodicInput.from_pieces: the ends {moments} must increase from above 0")
+        formulas = [[_formula(entry, symbols) for entry in entries] for _, entries in pieces]
         if len({len(row) for row in formulas}) != 1:
             raise ShapeError("PeriodicInput.from_pieces: every piece must have the same number of components")
+        inside = tuple(moments[:-1])
+        names = ("in pieces",) * len(formulas[0])
+        try:
+            waveform = piecewise_waveform(ends, formulas, TIME, tuple(symbols.values()))
+            return PeriodicInput(names, ends[-1], tuple(symbols), inside, waveform)
+        except (NotTrigonometricError, PeriodError):
+            free = set().union(*(f.free_symbols for row in formulas for f in row)) - {TIME}
+            if free:
+                raise InputError(
+                    f"PeriodicInput.from_pieces: the parameters {', '.join(sorted(map(str, free)))} need pieces that are "
+                    "polynomials in t with sines and cosines of commensurate rates"
+                ) from None
         functions = [_compiled(row) for row in formulas]
 
         def evaluate(t: Array) -> Array:
-            index = np.clip(np.searchsorted(ends, t, side="right"), 0, len(ends) - 1)
+            index = np.clip(np.searchsorted(moments, t, side="right"), 0, len(moments) - 1)
             result = np.empty((len(t), len(formulas[0])))
             for piece, function in enumerate(functions):
                 here = index == piece
                 result[here] = function(t[here])
             return result
 
-        return PeriodicInput.from_callable(evaluate, pieces[-1][0], breakpoints=ends[:-1])
+        return PeriodicInput.from_callable(evaluate, ends[-1], breakpoints=inside)
 
     @property
     def dim(self) -> int:
@@ -167,7 +184,7 @@ class PeriodicInput:
 
     @property
     def exact(self) -> bool:
-        """Whether the input is an exact trigonometric polynomial."""
+        """Whether its averages are exact: sums of sines and cosines, or pieces of polynomials with them."""
         return self.waveform.exact
 
     @property
@@ -231,7 +248,7 @@ class PeriodicInput:
         numbers = {_symbol(name): _binary(value) for name, value in values.items()}
         left = tuple(name for name in self.parameters if name not in values)
         if not isinstance(self.waveform, TrigWaveform):
-            return self
+            raise InputError("PeriodicInput.at: put the numbers into the formulas of an input in pieces")
         return PeriodicInput(self.components, None, left, self.breakpoints, with_values(self.waveform, numbers))
 
     def linear(self, matrix: Any) -> PeriodicInput:
@@ -268,8 +285,8 @@ class PeriodicInput:
         constant = calculus.mean(u)
         wave = calculus.primitive(calculus.combine([(1, u), (-1, constant)]))
         periodic = self.waveform.evaluator(calculus, wave, self.dim)
-        drift = self.mean
-        return lambda t: periodic(t) + t[..., None] * drift
+        drift, omega = self.mean, float(self.waveform.omega)
+        return lambda t: periodic(t) / omega + t[..., None] * drift
 
 
 def _waveform(u: PeriodicInput) -> Waveform:

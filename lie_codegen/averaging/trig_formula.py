@@ -24,7 +24,7 @@ class NotTrigonometricError(Exception):
 
 
 @dataclass
-class _Census:
+class Census:
     """What a first walk over the formulas finds."""
 
     time: sp.Symbol
@@ -139,13 +139,13 @@ def trig_form(formulas: Sequence[sp.Expr], time: sp.Symbol, period: sp.Expr | No
         NotTrigonometricError: if one of them is none.
         PeriodError: see `base_rate`.
     """
-    census = _Census(time)
+    census = Census(time)
     for formula in formulas:
         census.visit(formula)
     omega = base_rate(list(census.rates), period, where)
     ring = CoefficientRing.holding(census.coefficients)
     units = tuple(sp.Mul(sp.Rational(1, q), unit) for unit, q in census.units.items())
-    reader = _Reader(time, ring, dict(zip(census.units, range(len(units)), strict=True)), census.units, omega)
+    reader = Reader(time, ring, dict(zip(census.units, range(len(units)), strict=True)), census.units, omega)
     waves = [reader.read(formula) for formula in formulas]
     common = math.lcm(1, *(d for _, d in waves))
     components = {}
@@ -158,7 +158,7 @@ def trig_form(formulas: Sequence[sp.Expr], time: sp.Symbol, period: sp.Expr | No
 
 
 @dataclass(frozen=True)
-class _Reader:
+class Reader:
     time: sp.Symbol
     ring: CoefficientRing
     position: dict[sp.Expr, int]

@@ -73,7 +73,7 @@ class TrigCalculus:
             for k, c in rows:
                 for p, wave in wedge.items():
                     trig.add_scaled(total.setdefault(k, {}).setdefault(p, {}), wave, c, multiply)
-        return self._reduced(total, 2 * scale * x.denominator * y.denominator)
+        return self.reduced(total, 2 * scale * x.denominator * y.denominator)
 
     def combine(self, terms: Iterable[tuple[Fraction | int, TrigSignal]]) -> TrigSignal:
         """sum of factor * signal."""
@@ -88,12 +88,12 @@ class TrigCalculus:
             for i, component in signal.components.items():
                 for p, wave in component.items():
                     trig.add_scaled(total.setdefault(i, {}).setdefault(p, {}), wave, integer, multiply)
-        return self._reduced(total, denominator)
+        return self.reduced(total, denominator)
 
     def mean(self, x: TrigSignal) -> TrigSignal:
         """(1 / 2 pi) int_0^{2 pi} x d tau, for a signal without powers of tau."""
         total = {i: {0: trig.mean(component.get(0, {}))} for i, component in x.components.items()}
-        return self._reduced(total, x.denominator)
+        return self.reduced(total, x.denominator)
 
     def primitive(self, x: TrigSignal) -> TrigSignal:
         """int_0^tau x."""
@@ -110,7 +110,7 @@ class TrigCalculus:
                 trig.add_term(start, at_zero, -cosine, -sine)
             for key, (cosine, sine) in start.items():
                 trig.add_term(target.setdefault(0, {}), key, cosine, sine)
-        return self._reduced(total, x.denominator * divisor)
+        return self.reduced(total, x.denominator * divisor)
 
     def times_tau(self, x: TrigSignal) -> TrigSignal:
         """tau x."""
@@ -124,7 +124,7 @@ class TrigCalculus:
                 powers.update(f ** (p + 1) for f in trig.frequencies(wave))
         return powers
 
-    def _reduced(self, total: dict[int, Component], denominator: int) -> TrigSignal:
+    def reduced(self, total: dict[int, Component], denominator: int) -> TrigSignal:
         """Zeros dropped, common factors cancelled."""
         components: dict[int, Component] = {}
         for i, component in total.items():

@@ -35,6 +35,9 @@ class Waveform(Protocol):
     def exact(self) -> bool: ...
 
     @property
+    def has_formula(self) -> bool: ...
+
+    @property
     def omega(self) -> sp.Expr: ...
 
     @property
@@ -82,6 +85,11 @@ class TrigWaveform:
         return True
 
     @property
+    def has_formula(self) -> bool:
+        """True: signals are expressions in t."""
+        return True
+
+    @property
     def omega(self) -> sp.Expr:
         """2 pi / T."""
         return self.form.omega
@@ -103,7 +111,7 @@ class TrigWaveform:
         ring = CoefficientRing.holding([*self.form.ring.generators, *constants])
         if ring.generators == self.form.ring.generators:
             return TrigCalculus(brackets, self.form.ring), self.form.signal
-        return TrigCalculus(brackets, ring), _moved(self.form.signal, self.form.ring, ring)
+        return TrigCalculus(brackets, ring), moved(self.form.signal, self.form.ring, ring)
 
     def expressions(self, calculus: TrigCalculus, signal: TrigSignal, dim: int, time: sp.Expr) -> sp.ImmutableMatrix:
         return expressions_of(signal, dim, calculus.ring, self.omega * time, self.form.units)
@@ -125,7 +133,7 @@ class TrigWaveform:
         return signal.is_zero
 
 
-def _moved(signal: TrigSignal, old: CoefficientRing, new: CoefficientRing) -> TrigSignal:
+def moved(signal: TrigSignal, old: CoefficientRing, new: CoefficientRing) -> TrigSignal:
     """A signal with its coefficients in a larger ring."""
     place = [new.generators.index(g) for g in old.generators]
 
@@ -169,6 +177,11 @@ class SampledWaveform:
 
     @property
     def exact(self) -> bool:
+        """False."""
+        return False
+
+    @property
+    def has_formula(self) -> bool:
         """False."""
         return False
 
@@ -245,7 +258,7 @@ def linear_image(form: TrigForm, matrix: sp.MatrixBase) -> TrigForm:
     """The form of C u: an exact matrix times the functions."""
     entries = [sp.expand(value) for value in matrix.flat()]
     ring = CoefficientRing.holding([*form.ring.generators, *entries])
-    signal = _moved(form.signal, form.ring, ring)
+    signal = moved(form.signal, form.ring, ring)
     elements = [ring.element(value) for value in entries]
     common = int(sp.ilcm(1, *(d for _, d in elements)))
     components: dict[int, Any] = {}

@@ -46,9 +46,9 @@ def averaged_kernels(averaged: Averaged, statement: str = "") -> tuple[Kernel, .
     Raises:
         InputError: a sampled input (its Lambda has no formula; see `averaged_rate`), or an X0 that is not I.
     """
-    if not averaged.u.exact:
+    if not averaged.u.waveform.has_formula:
         raise InputError(
-            "averaged_kernels: a sampled input has no formula in t; only averaged_rate(averaged) can be made"
+            "averaged_kernels: a sampled input, or one in pieces, has no one formula in t; only averaged_rate(averaged) can be made"
         )
     if not np.array_equal(averaged.X0, np.eye(averaged.group.degree)):
         raise InputError("averaged_kernels: X0 must be the identity; multiply the state from the left by your X0")
