@@ -110,3 +110,13 @@ def test_steer_and_simulate_print_json(tmp_path: Path) -> None:
     simulated = run("simulate", "so3", "--u", "0", "--u", "0", "--u", "pi/2", "--end", "1", "--json", cwd=tmp_path)
     X = json.loads(simulated.stdout)["X_final"]
     assert max(abs(X[0][1] + 1), abs(X[1][0] - 1), abs(X[0][0])) < 1e-12
+
+
+def test_average_prints_exact_coefficients_and_measures_its_order(tmp_path: Path) -> None:
+    u = ("--u", "cos(t)", "--u", "sin(t)", "--u", "0")
+    done = run("average", "so3", *u, "--order", "3", "--check", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["exact_F"] == [["0", "0", "0"], ["0", "0", "1/2"], ["1/2", "0", "0"]]
+    assert result["check"]["passed"]
+    assert run("average", "so3", "--u", "cos(t)", cwd=tmp_path).returncode == 2
