@@ -98,11 +98,7 @@ def endpoint(group: MatrixGroup) -> Kernel:
 
     def body(ops: Arithmetic, target: Any, X: Any) -> tuple[Any, ...]:
         r = [x - goal for x, goal in zip(X, target, strict=True)]
-        matrix = unpack(group, X)
-        moves = []
-        for k in range(n):
-            unit = [1 if j == k else 0 for j in range(n)]
-            moves.append(pack(group, _matmul(matrix, hat_body(group, ops, unit))))
+        moves = right_moves(group, ops, X)
         q = [sum_products(zip(move, r, strict=True)) for move in moves]
         G = [[sum_products(zip(moves[max(k, j)], moves[min(k, j)], strict=True)) for j in range(n)] for k in range(n)]
         return sum_products(zip(r, r, strict=True)), q, G
@@ -115,6 +111,13 @@ def endpoint(group: MatrixGroup) -> Kernel:
         body,
         formula="r = X - target, F = |r|^2, q_k = <X A_k, r>, G_kl = <X A_k, X A_l>",
     )
+
+
+def right_moves(group: MatrixGroup, ops: Arithmetic, X: Sequence[Scalar]) -> list[list[Scalar]]:
+    """X A_k, packed, for each k, from X packed."""
+    matrix = unpack(group, X)
+    units = [[1 if j == k else 0 for j in range(group.dim)] for k in range(group.dim)]
+    return [pack(group, _matmul(matrix, hat_body(group, ops, unit))) for unit in units]
 
 
 def advance(group: MatrixGroup) -> Kernel:

@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
 
 from lie_codegen.simulation.flow import simulate
 from lie_codegen.simulation.metric import distance
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
+
+Array = NDArray[Any]
 
 _NODES, _WEIGHTS = leggauss(10)
 _PANELS = 400
@@ -40,10 +43,11 @@ def finish(
     *,
     solved: Status,
     otherwise: Status,
+    drift: Array | None = None,
 ) -> Plan:
-    """Simulates the true system under u and reports where it ends."""
+    """Simulates the true system under u, and the drift if there is one, and reports where it ends."""
     started = time.perf_counter()
-    run = simulate(task.group, u, t=[0.0, task.duration])
+    run = simulate(task.group, u if drift is None else u.plus(drift), t=[0.0, task.duration])
     error = distance(task.group, task.target, run.X[-1])
     return Plan(
         group=task.group,

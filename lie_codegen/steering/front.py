@@ -9,12 +9,22 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.errors import SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.area_rule import area_rule, loops
+from lie_codegen.steering.feedback import feedback
 from lie_codegen.steering.four_phase import four_phase
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import make_task
+from lie_codegen.steering.transcription import transcription
 
-_METHODS: Mapping[str, Callable[..., Plan]] = {"four_phase": four_phase, "optimal": optimal}
+_METHODS: Mapping[str, Callable[..., Plan]] = {
+    "four_phase": four_phase,
+    "area_rule": area_rule,
+    "loops": loops,
+    "optimal": optimal,
+    "transcription": transcription,
+    "feedback": feedback,
+}
 
 
 def steer(
@@ -22,7 +32,7 @@ def steer(
     target: ArrayLike,
     controls: Sequence[str | int],
     duration: float,
-    method: str = "optimal",
+    method: str = "auto",
     *,
     tolerance: float = 1e-6,
     **options: Any,
@@ -34,9 +44,15 @@ def steer(
         target: (d, d) group element, or (n,) coordinates of the second kind.
         controls: labels (or positions) of the actuated basis elements.
         duration: seconds.
-        method: "four_phase" (closed form, section 5.2 of the paper) or "optimal" (minimum energy).
+        method: "auto": "transcription" if an option asks for it (bounds, obstacles ...), else "optimal";
+            "four_phase": closed form, section 5.2 of TR 93-59; two controls;
+            "area_rule": Fourier controls of least energy within the averaged model, then retuned to hit the target exactly;
+            "loops": a straight part and one loop for each bracket, one after the other;
+            "optimal": minimum energy, exact extremals;
+            "transcription": bounds, rates, obstacles, drift, via points, minimum time;
+            "feedback": in steps, each planned from the measured state.
         tolerance: endpoint error |log(target^-1 X)| below which the plan counts as solved.
-        **options: of the method: q for "four_phase"; intervals, starts, progress for "optimal".
+        **options: of the method; see its function.
 
     Raises:
         UncontrollableError: with the growth vector and the missing directions.
@@ -44,11 +60,18 @@ def steer(
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
         SteeringError: the solver found nothing admissible; says what was tried.
     """
+    if method == "auto":
+        method = "transcription" if set(options) - _options_of(optimal) else "optimal"
     solver = _METHODS.get(method)
     if solver is None:
-        raise SteeringInputError(f"no method {method!r}; there are {', '.join(sorted(_METHODS))}")
-    known = (solver.__kwdefaults__ or {}).keys()
+        raise SteeringInputError(f"no method {method!r}; there are auto, {', '.join(sorted(_METHODS))}")
+    known = _options_of(solver)
     unknown = sorted(set(options) - known)
     if unknown:
-        raise SteeringInputError(f"{method} has no option {', '.join(unknown)}; it has {', '.join(known) or 'none'}")
+        has = ", ".join(sorted(known)) or "none"
+        raise SteeringInputError(f"{method} has no option {', '.join(unknown)}; it has {has}")
     return solver(make_task(group, target, controls, duration, tolerance), **options)
+
+
+def _options_of(solver: Callable[..., Plan]) -> set[str]:
+    return set(solver.__kwdefaults__ or {})

@@ -44,6 +44,14 @@ class Controls:
         values = self._evaluate(np.atleast_1d(times))
         return values[0] if times.ndim == 0 else values
 
+    def scaled(self, factor: Array) -> Controls:
+        """factor * u(t), component by component."""
+        return Controls(lambda t: self._evaluate(t) * factor, self.breakpoints)
+
+    def plus(self, drift: Array) -> Controls:
+        """u(t) + drift."""
+        return Controls(lambda t: self._evaluate(t) + drift, self.breakpoints)
+
 
 @dataclass(frozen=True)
 class Plan:

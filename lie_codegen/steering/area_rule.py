@@ -1,0 +1,209 @@
+"""method="area_rule" and "loops": controls from the areas of loops, then retuned to hit the target exactly."""
+
+from __future__ import annotations
+
+import operator
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.steering.constraints import limits
+from lie_codegen.steering.finish import finish
+from lie_codegen.steering.fourier import Family
+from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.seeds import coordinates, seed_controls
+from lie_codegen.steering.segments import Chain
+from lie_codegen.steering.shooting import SOLVED, shooter
+from lie_codegen.steering.task import Task
+
+Array = NDArray[Any]
+
+_SAMPLES = 65
+_SHARP = 1e-13
+_FINE = 8
+_TRIED = 3
+
+
+def area_rule(task: Task, *, harmonics: int = 2, bounds: Any = None, exact: bool = True, starts: int = 8) -> Plan:
+    """Fourier controls of least energy whose averaged endpoint is the target, then retuned.
+
+    minimise int |u|^2 subject to int U + 1/2 int [U~, U] = log(target): the second-order area rule in its single-exponential
+    form, a small quadratic program with quadratic constraints. Retuning then solves the same problem with the true
+    endpoint instead of the averaged one.
+
+    Args:
+        task: the task.
+        harmonics: K; at least one for each bracket that is needed.
+        bounds: of the controls, as in "transcription", at 65 samples.
+        exact: retune to the target; else the plan is approximate, to second order of averaging.
+        starts: phases of the first guess that are tried.
+
+    Raises:
+        SteeringInputError: about an option; controls that need brackets of brackets with exact=False.
+        SteeringError: no member of the family reaches the target.
+    """
+    started = time.perf_counter()
+    where = f"steer({task.group.name}): area_rule"
+    for name, value in (("harmonics", harmonics), ("starts", starts)):
+        if operator.index(value) < 1:
+            raise SteeringInputError(f"{where}: {name} must be at least 1, got {value}")
+    if task.report.depth > 1 and not exact:
+        raise SteeringInputError(
+            f"{where}: second-order averaging sees one bracket, these controls need {task.report.depth} "
+            f"(growth vector {task.report.growth}); use exact=True or method='optimal'"
+        )
+    family = Family(task.group, task.controls, harmonics)
+    low, high = (each * task.duration for each in limits(task.group, task.controls, bounds, f"{where}: bounds"))
+    x = coordinates(task.group, task.target)
+    s = np.linspace(0, 1, _SAMPLES)
+    first = seed_controls(task.group, task.controls, task.report.depth, x, starts, _SAMPLES)
+    averaged, averaged_energy = _averaged_members(task, family, x, [family.fitted(u, s) for u in first], low, high)
+    best = averaged[0] if averaged and not exact else None
+    tried = averaged[:_TRIED] or [family.fitted(u, s) for u in _optimum(task, s, first)]
+    for c in tried if exact else ():
+        c = _least_energy(family, c, lambda c: _exact_gap(family, task, c), low, high)
+        c, off = _restored(family, task, c)
+        if off < 1e-9 and (best is None or _energy(family, c) < _energy(family, best)):
+            best = c
+    if best is None:
+        raise SteeringError(
+            f"{where}: none of {starts} starts met the target with {harmonics} harmonics; try more harmonics or starts, wider "
+            "bounds, or method='optimal'"
+        )
+    coefficients = best.reshape(family.shape) / task.duration
+    gap, _ = _averaged_gap(family, x, best)
+    details = {
+        "winner": "Fourier controls" + (", retuned" if exact else ", averaged"),
+        "coefficients": coefficients,
+        "harmonics": harmonics,
+        "averaged_miss": float(np.linalg.norm(gap)),
+        "averaged_energy": averaged_energy / task.duration,
+        "optimality": "least energy within this family of controls, the best of the starts tried",
+    }
+    seconds = {"solve": time.perf_counter() - started}
+    end = Status.SOLVED if exact else Status.APPROXIMATE
+    otherwise = Status.NOT_CONVERGED if exact else Status.APPROXIMATE
+    return finish(task, "area_rule", _controls(task, family, best), details, seconds, solved=end, otherwise=otherwise)
+
+
+def loops(task: Task, *, exact: bool = True) -> Plan:
+    """A straight part, then a circle for each pair of controls whose area is needed, one after the other.
+
+    To second order X(T) = exp(x) prod_p exp(a_p [A_i, A_j]); with `exact` the straight part and the areas are solved for so that
+    the true endpoint is the target (Newton's method, derivatives by differences of the true flow).
+
+    Raises:
+        SteeringInputError: controls that need brackets of brackets.
+        SteeringError: Newton's method does not converge.
+    """
+    started = time.perf_counter()
+    if task.report.depth > 1:
+        raise SteeringInputError(
+            f"steer({task.group.name}): loops make single brackets, these controls need {task.report.depth} "
+            f"(growth vector {task.report.growth}); use method='optimal'"
+        )
+    chain = Chain.towards(task.group, task.controls, coordinates(task.group, task.target))
+    if exact:
+        chain = chain.retuned(task.target)
+    details = {
+        "winner": "a straight part and loops" + (", retuned" if exact else ""),
+        "straight": chain.straight,
+        "areas": {f"{task.group.labels[i]}, {task.group.labels[j]}": area for (i, j), area in chain.loops()},
+    }
+    seconds = {"solve": time.perf_counter() - started}
+    end = Status.SOLVED if exact else Status.APPROXIMATE
+    otherwise = Status.NOT_CONVERGED if exact else Status.APPROXIMATE
+    return finish(task, "loops", chain.controls_over(task.duration), details, seconds, solved=end, otherwise=otherwise)
+
+
+def _averaged_members(
+    task: Task, family: Family, x: Array, first: list[Array], low: Array, high: Array
+) -> tuple[list[Array], float]:
+    """The members that meet x by averaging, cheapest first, without repetitions of equal energy; the least energy."""
+    if task.report.depth > 1:
+        return [], np.inf
+    found: list[Array] = []
+    for guess in first:
+        c = _least_energy(family, guess, lambda c: _averaged_gap(family, x, c), low, high)
+        if np.max(np.abs(_averaged_gap(family, x, c)[0])) < 1e-8:
+            found.append(c)
+    found.sort(key=lambda c: _energy(family, c))
+    return found, _energy(family, found[0]) if found else np.inf
+
+
+def _optimum(task: Task, s: Array, otherwise: Array) -> list[Array]:
+    """Samples of the exact optimum, to be fitted, where averaging sees too little; else the given guesses."""
+    solver = shooter(task.group, task.controls)
+    found = solver.solve(task.target)
+    return [solver.extremal(found.mu0[0]).control(s)] if found.status[0] == SOLVED else list(otherwise)
+
+
+def _energy(family: Family, c: Array) -> float:
+    return float(np.sum(family.energy_weights * c * c))
+
+
+def _averaged_gap(family: Family, x: Array, c: Array) -> tuple[Array, Array]:
+    value, slope = family.averaged(c)
+    return value - x, slope
+
+
+def _exact_gap(family: Family, task: Task, c: Array, refine: int = 1) -> tuple[Array, Array]:
+    """vee of the projection of target^-1 X(1) - I, and its derivative by c."""
+    group = task.group
+    X, slope = family.exact(c, refine)
+    relative = np.linalg.solve(task.target, X)
+    return group.project(relative - np.eye(group.degree)), group.project(relative @ group.basis).T @ slope
+
+
+def _least_energy(
+    family: Family, c: Array, gap: Callable[[Array], tuple[Array, Array]], low: Array, high: Array
+) -> Array:
+    """Sequential quadratic programming with exact gradients."""
+    weights = family.energy_weights
+    constraints: list[dict[str, Any]] = [{"type": "eq", "fun": lambda c: gap(c)[0], "jac": lambda c: gap(c)[1]}]
+    waves = family.waves(np.linspace(0, 1, _SAMPLES))
+    for number, (least, most) in enumerate(zip(low, high, strict=True)):
+        if np.isfinite(least) or np.isfinite(most):
+            row = np.zeros((_SAMPLES, *family.shape))
+            row[:, number] = waves
+            A = row.reshape(_SAMPLES, -1)
+            for offset, matrix in ((most, -A), (-least, A)):
+                if np.isfinite(offset):
+                    constraints.append(
+                        {"type": "ineq", "fun": lambda c, o=offset, M=matrix: o + M @ c, "jac": lambda c, M=matrix: M}
+                    )
+    result = minimize(
+        lambda c: (float(weights @ (c * c)), 2 * weights * c),
+        c,
+        jac=True,
+        method="SLSQP",
+        constraints=constraints,
+        options={"maxiter": 100, "ftol": 1e-12},
+    )
+    return np.asarray(result.x)
+
+
+def _restored(family: Family, task: Task, c: Array) -> tuple[Array, float]:
+    """Newton's method, least change in energy norm, on the true endpoint; what is left of the gap."""
+    scale = 1 / np.sqrt(family.energy_weights)
+    gap, slope = _exact_gap(family, task, c, _FINE)
+    for _ in range(8):
+        if np.max(np.abs(gap)) < _SHARP:
+            break
+        c = c - scale * np.linalg.lstsq(slope * scale, gap, rcond=1e-9)[0]
+        gap, slope = _exact_gap(family, task, c, _FINE)
+    return c, float(np.max(np.abs(gap)))
+
+
+def _controls(task: Task, family: Family, c: Array) -> Controls:
+    def evaluate(t: Array) -> Array:
+        u = np.zeros((len(t), task.group.dim))
+        u[:, list(task.controls)] = family.evaluate(c, t / task.duration) / task.duration
+        return u
+
+    return Controls(evaluate, ())

@@ -1,0 +1,153 @@
+"""method="feedback": in steps, each planned from the measured state (sections 5.1 and 5.2 of TR 93-59).
+
+At the start of each step the state is measured, with noise; the rest of the way, target relative to the measurement, is planned
+in closed form by the area rule (or by any other method) and driven by the true, disturbed system. An error of the
+averaged model, of the gain or of the measurement is thus corrected by the next step. Where every direction is
+actuated the plan of a step is a constant control: first-order steering.
+"""
+
+from __future__ import annotations
+
+import operator
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.errors import ShapeError, SteeringInputError
+from lie_codegen.simulation.flow import simulate
+from lie_codegen.simulation.metric import distance, element_coordinates
+from lie_codegen.steering.finish import energy
+from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.seeds import area_rule_seed
+from lie_codegen.steering.task import Task
+
+Array = NDArray[Any]
+
+_SMALL_ENOUGH = 1.0
+
+
+def feedback(
+    task: Task,
+    *,
+    steps: int = 8,
+    planner: str = "area_rule",
+    gain: ArrayLike = 1.0,
+    disturbance: ArrayLike | None = None,
+    noise: float = 0.0,
+    seed: int = 0,
+    step_options: dict[str, Any] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """Steers in steps of equal duration.
+
+    Args:
+        task: the task; its duration is that of all steps together.
+        steps: number of steps.
+        planner: "area_rule": closed form, a straight part and circles; or a method of lc.steer for each step.
+        gain: what the true system makes of a commanded control, a number or (n,): X' = X hat(gain u + disturbance).
+        disturbance: (n,) constant velocity that the planner does not know.
+        noise: standard deviation of a measured state's coordinates (exponential, body side).
+        seed: of the noise.
+        step_options: options of the planner, where it is a method.
+        progress: called with one line a step.
+
+    Returns:
+        A plan whose u is what was commanded, whose X_final is where the true, disturbed system ended; details hold the error after
+        each step.
+
+    Raises:
+        SteeringInputError, ShapeError: about an option; and what the planner raises.
+    """
+    started = time.perf_counter()
+    group, n = task.group, task.group.dim
+    where = f"steer({group.name}): feedback"
+    if operator.index(steps) < 1:
+        raise SteeringInputError(f"{where}: steps must be at least 1, got {steps}")
+    if not noise >= 0 or not np.isfinite(noise):
+        raise SteeringInputError(f"{where}: noise must be a standard deviation, got {noise!r}")
+    factor = np.broadcast_to(np.asarray(gain, dtype=float), (n,))
+    push = np.zeros(n) if disturbance is None else np.asarray(disturbance, dtype=float)
+    if push.shape != (n,) or not np.all(np.isfinite(push)):
+        raise ShapeError(f"{where}: disturbance must be {n} finite numbers, got {disturbance!r}")
+    rng = np.random.default_rng(seed)
+    span = task.duration / steps
+    X = np.eye(group.degree, dtype=complex if group.is_complex else float)
+    parts: list[Controls] = []
+    errors = [distance(group, task.target, X)]
+    spent = 0.0
+    for number in range(1, steps + 1):
+        measured = X @ _exponential(group.hat(noise * rng.normal(size=n)))
+        rest = np.linalg.solve(measured, task.target)
+        u = _planned(replace(task, target=rest, duration=span), planner, step_options or {})
+        parts.append(u)
+        spent += energy(u, span)
+        X = simulate(group, u.scaled(factor).plus(push), t=[0.0, span], X0=X).X[-1]
+        errors.append(distance(group, task.target, X))
+        if progress is not None:
+            progress(f"step {number} of {steps}: error {errors[-1]:.3g}")
+    details = {
+        "winner": f"feedback in {steps} steps, each by {planner}",
+        "errors": tuple(errors),
+        "steps": steps,
+        "step_duration": span,
+        "noise": noise,
+    }
+    return Plan(
+        group=group,
+        target=task.target,
+        controls=tuple(group.labels[i] for i in task.controls),
+        duration=task.duration,
+        method="feedback",
+        u=_joined(parts, span, n),
+        cost=spent,
+        X_final=X,
+        error=errors[-1],
+        status=Status.SOLVED if errors[-1] <= task.tolerance else Status.APPROXIMATE,
+        seconds={"all": time.perf_counter() - started},
+        details=details,
+    )
+
+
+def _planned(task: Task, planner: str, options: dict[str, Any]) -> Controls:
+    if planner != "area_rule":
+        from lie_codegen.steering.front import steer
+
+        plan = steer(
+            task.group, task.target, task.controls, task.duration, planner, tolerance=task.tolerance, **options
+        )
+        return plan.u
+    x = element_coordinates(task.group, task.target)
+    size = float(np.linalg.norm(x))
+    x = x if size <= _SMALL_ENOUGH else x * (_SMALL_ENOUGH / size)
+
+    def evaluate(t: Array) -> Array:
+        u = np.zeros((len(t), task.group.dim))
+        s = t / task.duration
+        u[:, list(task.controls)] = area_rule_seed(task.group, task.controls, x, s, 0.0) / task.duration
+        return u
+
+    return Controls(evaluate, ())
+
+
+def _exponential(A: Array) -> Array:
+    from scipy.linalg import expm
+
+    return np.asarray(expm(A))
+
+
+def _joined(parts: list[Controls], span: float, n: int) -> Controls:
+    def evaluate(t: Array) -> Array:
+        place = np.clip((t / span).astype(int), 0, len(parts) - 1)
+        u = np.zeros((len(t), n))
+        for number, part in enumerate(parts):
+            now = place == number
+            if np.any(now):
+                u[now] = part(t[now] - number * span)
+        return u
+
+    inner = [number * span + np.asarray(part.breakpoints) for number, part in enumerate(parts)]
+    return Controls(evaluate, np.sort(np.concatenate([*inner, span * np.arange(1, len(parts))])))

@@ -1,0 +1,19 @@
+"""Elements of a group as the doubles that vary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernels.element_pattern import varying_entries
+
+Array = NDArray[Any]
+
+
+def pack_element(group: MatrixGroup, X: Array) -> Array:
+    """The varying entries of X, row by row, complex ones as (re, im)."""
+    entries = np.array([X[i, j] for i, j in varying_entries(group)], dtype=complex if group.is_complex else float)
+    return np.ascontiguousarray(entries).view(float)
