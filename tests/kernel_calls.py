@@ -1,0 +1,52 @@
+"""Kernels of a group as numpy functions, by the CasADi interpreter: complex arrays in and out, flat vectors inside."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+import lie_codegen as lc
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernels.group_kernels import group_kernel
+from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.lowering.casadi_arithmetic import function_of
+
+
+@cache
+def load(name: str) -> MatrixGroup:
+    return lc.group(name)
+
+
+@cache
+def kernel(name: str, kernel_name: str) -> Kernel:
+    return group_kernel(load(name), kernel_name)
+
+
+@cache
+def function(name: str, kernel_name: str) -> ca.Function:
+    return function_of(kernel(name, kernel_name))
+
+
+def call(name: str, kernel_name: str, *arguments: Any) -> np.ndarray:
+    k = kernel(name, kernel_name)
+    flat = [flatten(port, value) for port, value in zip(k.inputs, arguments, strict=True)]
+    return unflatten(k.outputs[0], np.array(function(name, kernel_name)(*flat)))
+
+
+def flatten(port: Port, value: Any) -> np.ndarray:
+    array = np.asarray(value, dtype=complex if port.is_complex else float)
+    return np.stack([array.real, array.imag], axis=-1).ravel() if port.is_complex else array.ravel()
+
+
+def unflatten(port: Port, flat: np.ndarray) -> np.ndarray:
+    values = flat.ravel()
+    return (values[::2] + 1j * values[1::2] if port.is_complex else values).reshape(port.shape)
+
+
+def adjoint_matrix(group: MatrixGroup, x: np.ndarray) -> np.ndarray:
+    """ad_x from commutators of matrices: shares nothing with the structure constants."""
+    X = group.hat(x)
+    return np.array([group.vee(X @ A - A @ X) for A in group.basis]).T
