@@ -15,6 +15,7 @@ from lie_codegen.control.attitude import attitude_linearisation, attitude_region
 from lie_codegen.errors import InertiaWarning, InputError
 from lie_codegen.kernels.attitude_kernels import attitude_law, attitude_lyapunov
 from lie_codegen.kernels.dual import mpmath_arithmetic
+from lie_codegen.kernels.quaternion import rotation_from_quaternion, with_quaternion
 from lie_codegen.kernels.rotation_log import rotation_log
 from lie_codegen.lowering.casadi_arithmetic import function_of
 
@@ -237,3 +238,21 @@ def test_a_legal_metric_of_no_rigid_body_warns_and_a_body_does_not() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         attitude_law("pd", inertia=[3, 2, 1], k_p=4, k_d=6)
+
+
+def test_quaternion_input_gives_the_same_command_and_its_order_must_be_named() -> None:
+    law = attitude_law("pd", inertia=[3, 2, 2], k_p=4, k_d=6)
+    rng = np.random.default_rng(0)
+    for order, take in (("scalar_first", [3, 0, 1, 2]), ("scalar_last", [0, 1, 2, 3])):
+        by_quaternion = caller(with_quaternion(law, order=order))
+        for _ in range(3):
+            R, w = Rotation.random(random_state=rng), rng.normal(size=3)
+            q = R.as_quat()[take]
+            expected = caller(law)(R.as_matrix(), w)[0]
+            np.testing.assert_allclose(by_quaternion(q, w)[0], expected, atol=1e-13)
+            np.testing.assert_allclose(by_quaternion(-q, w)[0], expected, atol=1e-13)  # no unwinding
+            np.testing.assert_allclose(rotation_from_quaternion(q, order=order), R.as_matrix(), atol=1e-15)
+    with pytest.raises(InputError, match="the quaternion order is not given"):
+        with_quaternion(law)
+    with pytest.raises(InputError, match="'wxyz'; name it"):
+        rotation_from_quaternion([1, 0, 0, 0], order="wxyz")

@@ -96,7 +96,7 @@ def attitude_gain(value: Any, size: int, what: str) -> sp.ImmutableMatrix:
     """
     matrix = symmetric_matrix(value, size, what)
     values = eigenvalues(matrix)
-    if size > 1 and values[0] + values[1] <= _RELATIVE * max(1.0, abs(values[-1])):
+    if size > 1 and values[0] + values[1] <= _RELATIVE * abs(values[-1]):
         raise InputError(
             f"{what} has eigenvalues {_listed(values)}; the sum of any two must be positive, otherwise the error "
             "function is not zero at the reference alone"
