@@ -176,8 +176,30 @@ def test_refusals_name_theorem_and_condition() -> None:
     with pytest.raises(InputError, match="order must be"):
         lc.average(group, lc.PeriodicInput(ZERO_MEAN, "2*pi"), 0)
     square = lc.PeriodicInput.from_pieces([(1, ["1", "0", "0"]), (2, ["-1", "0", "0"])])
-    with pytest.warns(AssumptionWarning, match=r"Theorem 3.*t = 1"):
+    with pytest.warns(AssumptionWarning, match=r"Theorem 3.*t = 0, 1"):
         lc.average(group, square, 2, "product")
+
+
+def test_lemma_3_brackets_of_the_columns_of_m_are_the_structure_constants() -> None:
+    """(30): [f_i, f_j](0) = Gamma_ij for the columns of M(g), with [F, G] = DG F - DF G."""
+    for name in ("so3", "sl2", "se2"):
+        group = lc.group(name)
+        wn = lc.wei_norman(group)
+        zero = dict.fromkeys(wn.g, 0)
+        columns = [sp.Matrix(wn.M[:, j]) for j in range(group.dim)]
+        slopes = [column.jacobian(wn.g).subs(zero) for column in columns]
+        for i in range(group.dim):
+            for j in range(group.dim):
+                bracket = slopes[j] * columns[i].subs(zero) - slopes[i] * columns[j].subs(zero)
+                expected = [float(value) for value in group.algebra.structure_constants[i, j]]
+                np.testing.assert_allclose(np.array(bracket, dtype=float).ravel(), expected, atol=1e-14)
+
+
+def test_a_jump_at_whole_periods_is_flagged_too() -> None:
+    saw = lc.PeriodicInput.from_callable(lambda t: np.stack([t - 1, 0 * t, 0 * t], axis=-1), 2)
+    assert saw.jumps == (0.0,)
+    with pytest.warns(AssumptionWarning, match="t = 0"):
+        lc.average(lc.group("so3"), saw, 2)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import lie_codegen as lc
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernels.averaged_feedback import feedback_average
-from lie_codegen.kernels.averaged_kernels import averaged_kernels, averaged_rate
+from lie_codegen.kernels.averaged_kernels import averaged_kernels, averaged_rate, averaged_wei_norman
 
 PARAMETERS = ("A", "B", "phi")
 VALUES = {"A": 0.7, "B": 0.4, "phi": 0.3}
@@ -61,6 +61,14 @@ def test_the_generated_header_states_the_measured_order(tmp_path: Path) -> None:
     header = " ".join("".join(path.read_text() for path in folder.rglob("*.h")).replace("*", " ").split())
     assert f"{check.constant:.4g} eps" in header
     assert "slope" in header
+
+
+def test_theorem_1_the_averaged_wei_norman_equations_are_the_averaged_group_system() -> None:
+    so3 = lc.group("so3")
+    averaged = lc.average(so3, lc.PeriodicInput(["1/2 + cos(t)", "1/3 + sin(t)", "-1/4"], "2*pi"), 1)
+    g_dot = lc.build(averaged_wei_norman(averaged)).averaged_wei_norman
+    g = solve_ivp(lambda t, g: g_dot(0.2, g), (0, 9.0), np.zeros(3), rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(lc.build(so3).product_exp(g), averaged.state(0.2, 9.0), atol=1e-10)
 
 
 def test_sampled_inputs_give_rates_only() -> None:

@@ -50,6 +50,13 @@ def test_the_normal_form_is_canonical() -> None:
     assert list(PeriodicInput(["4*cos(t)^3 - 3*cos(t)"]).expressions) == [sp.cos(3 * TIME)]
 
 
+def test_floats_are_taken_at_their_binary_value() -> None:
+    t = sp.Symbol("t")
+    u = PeriodicInput([0.1, 0.3 * sp.cos(t + 0.7)], "2*pi")
+    assert u.exact_mean[0] == sp.Rational(*(0.1).as_integer_ratio())
+    assert u(1.1)[1] == pytest.approx(0.3 * np.cos(1.8), abs=1e-16)
+
+
 def test_shapes_and_equal_bits_for_scalars_and_arrays() -> None:
     u = PeriodicInput(["cos(t)", "sin(3*t)"])
     times = np.linspace(0, 9, 12).reshape(3, 4)
@@ -186,6 +193,20 @@ def test_pieces_and_quadrature_give_the_same_averages() -> None:
     np.testing.assert_allclose(a.state(0.1, [2.0, 9.0]), b.state(0.1, [2.0, 9.0]), atol=1e-13)
     with pytest.warns(AssumptionWarning):
         assert lc.order_check(group, exact, 3, horizon=1.5).passed
+
+
+def test_simulation_takes_periodic_inputs_and_their_repeated_jumps() -> None:
+    so3 = lc.group("so3")
+    square = PeriodicInput.from_pieces(
+        [(1, ["1", "0", "0"]), (2, ["0", "1", "0"]), (3, ["-1", "0", "0"]), (4, ["0", "-1", "0"])]
+    )
+    np.testing.assert_allclose(square.breakpoints_between(2.5, 8.5), [3, 4, 5, 6, 7, 8])
+    smooth = PeriodicInput(["cos(t) + 1/5", "sin(t)", "0"], "2*pi")
+    for u in (square, smooth):
+        flow = reference_flow(so3, u, 0.3, 20.0)
+        run = lc.simulate(so3, u, eps=0.3, t=flow.t)
+        np.testing.assert_allclose(run.X, flow.X, atol=2e-10)
+        assert run.steps < 100_000
 
 
 def test_linear_images_are_exact() -> None:

@@ -25,10 +25,10 @@ Array = NDArray[Any]
 #: form -> the orders it has.
 FORMS = {"floquet": None, "product": (1, 2), "single": (1, 2, 3)}
 _THEOREMS = {"product": "Theorem 3 (area rule)", "single": "Theorem 4 (single-exponential area rule)"}
-_MOST = 16
+_MOST = 32
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Averaged:
     """The average of X' = eps X hat(u(t)), X(0) = X0, with error O(eps^order) on [0, b / eps].
 
@@ -242,11 +242,11 @@ def _check_form(form: str, order: int) -> None:
 
 
 def _warn_of_jumps(u: PeriodicInput, form: str) -> None:
-    if u.breakpoints:
+    if u.jumps:
         theorem = _THEOREMS.get(form, "Theorem 2 (first order)")
-        times = ", ".join(f"{b:g}" for b in u.breakpoints[:4])
+        times = ", ".join(f"{b:g}" for b in u.jumps[:4])
         warnings.warn(
-            f"{theorem} of TR 93-59 asks for continuous derivatives; this input has breakpoints at t = {times}. The "
+            f"{theorem} of TR 93-59 asks for continuous derivatives; this input jumps or bends at t = {times}. The "
             "averages are those of the bounded, piecewise smooth input; check their order with order_check",
             AssumptionWarning,
             stacklevel=3,

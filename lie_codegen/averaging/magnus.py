@@ -31,7 +31,7 @@ Array = NDArray[Any]
 _MOST = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Magnus:
     """The Magnus series of X' = eps X hat(u), X(0) = I, to order p.
 

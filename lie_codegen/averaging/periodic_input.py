@@ -26,7 +26,7 @@ TIME = sp.Symbol("t", real=True)
 _PERIODIC_TO = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PeriodicInput:
     """u(t) with u(t + T) = u(t), callable: u(t) is (n,) for a scalar t and (..., n) for an array.
 
@@ -35,7 +35,7 @@ class PeriodicInput:
 
     Attributes:
         components: n formulas: texts in t, pi and the parameters (functions sin, cos, sqrt, ...), SymPy expressions, or
-            numbers.
+            numbers (floats at their exact binary value: write 0.1 as "0.1" or "1/10" for one tenth).
         period: T as a text, a number or a SymPy expression; the smallest common period if not given. [time unit]
         parameters: names of symbolic amplitudes and phases.
         breakpoints: times in (0, T) at which u or a derivative jumps.
@@ -215,6 +215,14 @@ class PeriodicInput:
         return self.waveform.vanishes(calculus, calculus.mean(u))
 
     @cached_property
+    def jumps(self) -> tuple[float, ...]:
+        """Times in [0, T) at which u is given to jump or bend: the breakpoints, and 0 if u(T-) differs from u(0)."""
+        start, end = self._evaluate(np.array([0.0, self.T * (1 - 1e-12)])) if not self.symbols else (0.0, 0.0)
+        scale = max(1.0, float(np.max(np.abs(start), initial=0.0)))
+        around = float(np.max(np.abs(np.asarray(end) - start), initial=0.0)) > 1e-6 * scale
+        return (*((0.0,) if around else ()), *self.breakpoints)
+
+    @cached_property
     def expressions(self) -> sp.ImmutableMatrix:
         """(n, 1) the normal form: sums of sines and cosines of multiples of 2 pi t / T.
 
@@ -231,6 +239,14 @@ class PeriodicInput:
     def integral(self, t: ArrayLike) -> Array:
         """ut(t) = int_0^t u, any t: (...,) -> (..., n)."""
         return self._integrate(np.asarray(t, dtype=float))
+
+    def breakpoints_between(self, start: float, end: float) -> Array:
+        """The times in [start, end] at which the input may jump: its breakpoints and whole periods, repeated."""
+        if not self.breakpoints:
+            return np.empty(0)
+        periods = np.arange(np.floor(start / self.T), np.ceil(end / self.T) + 1)
+        times = np.sort((periods[:, None] * self.T + np.array([0.0, *self.breakpoints])).ravel())
+        return np.asarray(times[(times >= start) & (times <= end)])
 
     def at(self, **values: Any) -> PeriodicInput:
         """The input with numbers (floats at their exact binary value) in place of parameters.
@@ -354,8 +370,9 @@ def _formula(entry: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
         for symbol in entry.free_symbols:
             if str(symbol) not in known:
                 raise InputError(f"PeriodicInput: {symbol} in {entry} is not declared; name it in `parameters`")
-        return entry.xreplace({symbol: known[str(symbol)] for symbol in entry.free_symbols})
-    return exact_number(entry)
+        floats = {number: _binary(float(number)) for number in entry.atoms(sp.Float)}
+        return entry.xreplace({**floats, **{symbol: known[str(symbol)] for symbol in entry.free_symbols}})
+    return _binary(entry)
 
 
 def period_of(value: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
@@ -368,8 +385,6 @@ def period_of(value: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
 
 
 def _number(value: Any, what: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
-    if isinstance(value, float | np.floating):
-        return _binary(value)
     result = _formula(value, symbols)
     if result.has(TIME):
         raise InputError(f"PeriodicInput: {what} {value!r} depends on t")

@@ -3,6 +3,7 @@
 averaged_rate(eps, parameters) -> rate      sum_{q<=p} eps^q F_q
 averaged_state(eps, t, parameters) -> X     the approximation of X(t) from the identity, error O(eps^p) on [0, b / eps]
 periodic_input(t, parameters) -> u          u(t) itself
+averaged_wei_norman(eps, g, parameters) -> g_dot    gbar' = eps M(gbar) u_av, (11)
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import matrix_port
 from lie_codegen.kernels.kernel import Kernel, Port, Sampler
 from lie_codegen.kernels.linear import Vector, bracket, matmul, plus, scaled
-from lie_codegen.kernels.wei_norman_body import product_exp
+from lie_codegen.kernels.wei_norman_body import product_exp, rate
 
 _SOURCE = {
     "floquet": "Floquet-Magnus recursion, left-invariant form",
@@ -98,6 +99,22 @@ def averaged_state(averaged: Averaged, statement: str = "") -> Kernel:
     output = matrix_port(group, "X", "averaged state, from the identity")
     sampler = _sampler(averaged, inputs)
     return Kernel("averaged_state", group.name, inputs, (output,), body, formula, _SOURCE[averaged.form], sampler)
+
+
+def averaged_wei_norman(averaged: Averaged) -> Kernel:
+    """(eps, g, parameters) -> g_dot: the averaged Wei-Norman equations (11); Phi(gbar(t)) = X(0) exp(eps t U_av), Theorem 1."""
+    group, symbols = averaged.group, averaged.parameters
+    data = GroupDerivation(group)
+
+    def body(ops: Arithmetic, eps: Scalar, g: Sequence[Scalar], *values: Scalar) -> tuple[Any, ...]:
+        evaluate = ExpressionEvaluator(ops, dict(zip(symbols, values, strict=True)))
+        return (rate(ops, data.wei_norman, g, scaled(eps, _vector(evaluate, averaged.exact_F[0]))),)
+
+    inputs = (_EPS, Port("g", (group.dim,), ", ".join(group.units) if any(group.units) else ""), *_parameters(symbols))
+    output = Port("g_dot", (group.dim,), _units(averaged))
+    formula = "gbar' = eps M(gbar) u_av, u_av = (1/T) int_0^T u"
+    source = "Leonard and Krishnaprasad, TR 93-59, (11) and Theorem 1"
+    return Kernel("averaged_wei_norman", group.name, inputs, (output,), body, formula, source)
 
 
 def periodic_input(averaged: Averaged) -> Kernel:

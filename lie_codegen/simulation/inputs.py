@@ -38,7 +38,7 @@ def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
         NotFiniteError: if u holds NaN or infinity.
     """
     if callable(u):
-        return Signal(_vectorised(group, u, t), np.asarray(getattr(u, "breakpoints", ()), dtype=float))
+        return Signal(_vectorised(group, u, t), _breakpoints(u, t))
     values = np.asarray(u, dtype=float)
     if not np.all(np.isfinite(values)):
         raise NotFiniteError(f"simulate({group.name}): u holds NaN or infinity")
@@ -51,6 +51,13 @@ def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
         f"simulate({group.name}): u has shape {values.shape}; give a function of t, a constant ({group.dim},), or "
         f"samples ({len(t)}, {group.dim}) at the times t"
     )
+
+
+def _breakpoints(u: Any, t: Array) -> Array:
+    """The times at which u is not smooth; a periodic input repeats its own over [t_0, t_k]."""
+    within = getattr(u, "breakpoints_between", None)
+    times = within(float(t[0]), float(t[-1])) if callable(within) else getattr(u, "breakpoints", ())
+    return np.asarray(times, dtype=float)
 
 
 def _vectorised(group: MatrixGroup, u: Callable[[Any], Any], t: Array) -> Callable[[Array], Array]:
