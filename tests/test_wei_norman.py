@@ -64,7 +64,7 @@ def test_published_matrices_come_out_as_they_are_written(
     names = {str(symbol): symbol for symbol in wn.g}
     assert wn.determinant == sp.parse_expr(determinant, names)
     if M is not None:
-        assert wn.M == sp.ImmutableMatrix(sp.parse_expr(M, names))
+        assert sp.ImmutableMatrix(sp.parse_expr(M, names)) == wn.M
 
 
 def test_split_so4_and_so5_have_products_of_cosines() -> None:

@@ -101,7 +101,7 @@ class Structure:
 
     @property
     def kind(self) -> str:
-        """One word or two: abelian, nilpotent, solvable, semisimple, reductive, or "neither"."""
+        """One of abelian, nilpotent, solvable, semisimple, reductive, "Levi + radical" (none of these)."""
         if self.abelian:
             return "abelian"
         if self.nilpotent:
@@ -110,7 +110,7 @@ class Structure:
             return "solvable"
         if self.semisimple:
             return "semisimple"
-        return "reductive" if self.reductive else "Levi, not reductive"
+        return "reductive" if self.reductive else "Levi + radical"
 
 
 def structure(algebra: LieAlgebra) -> Structure:
