@@ -6,14 +6,26 @@ import json
 import os
 import subprocess
 import sys
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from lie_codegen.cli.app import main
 
-def run(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+
+@dataclass
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run(*arguments: str, cwd: Path, **environment: str) -> Done:
+    """In a process of its own."""
     root = str(Path(__file__).resolve().parent.parent)
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-m", "lie_codegen", *arguments],
         cwd=cwd,
         capture_output=True,
@@ -21,21 +33,39 @@ def run(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedP
         env={**os.environ, "PYTHONPATH": root, **environment},
         timeout=300,
     )
+    return Done(done.returncode, done.stdout, done.stderr)
 
 
-def test_list_and_show_print_one_json_object(tmp_path: Path) -> None:
-    groups = json.loads(run("list", "--json", cwd=tmp_path).stdout)["groups"]
+@pytest.fixture
+def cli(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """The command line in this process, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+
+    def invoke(*arguments: str) -> Done:
+        monkeypatch.setattr(sys, "argv", ["lie-codegen", *arguments])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            main()
+        out, err = capsys.readouterr()
+        return Done(int(stop.value.code or 0), out, err)
+
+    return invoke
+
+
+def test_list_and_show_print_one_json_object(cli, tmp_path: Path) -> None:
+    groups = json.loads(cli("list", "--json").stdout)["groups"]
     assert {"so3", "se2", "se3", "su2", "sl2", "h3"} <= {group["name"] for group in groups}
-    shown = json.loads(run("show", "so3", "--json", cwd=tmp_path).stdout)
+    shown = json.loads(cli("show", "so3", "--json").stdout)
     assert shown["determinant_of_inverse"] == "cos(g2)"
     assert shown["brackets"]["[w1, w2]"] == "w3"
 
 
-def test_new_writes_a_file_that_check_proves_and_generate_takes(tmp_path: Path) -> None:
-    assert run("new", "mine", cwd=tmp_path).returncode == 0
-    assert "proved exactly" in run("check", "mine.toml", cwd=tmp_path).stdout
-    assert run("new", "mine", cwd=tmp_path).returncode == 2, "an existing file is not overwritten"
-    done = run("generate", "mine.toml", "--out", "out", "--json", cwd=tmp_path)
+def test_new_writes_a_file_that_check_proves_and_generate_takes(cli, tmp_path: Path) -> None:
+    assert cli("new", "mine").returncode == 0
+    assert "proved exactly" in cli("check", "mine.toml").stdout
+    assert cli("new", "mine").returncode == 2, "an existing file is not overwritten"
+    done = cli("generate", "mine.toml", "--out", "out", "--json")
     assert done.returncode == 0, done.stderr
     assert {"include/mine.h", "src/mine.c", "example.c", "manifest.json"} <= set(json.loads(done.stdout)["files"])
 
@@ -55,11 +85,11 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("case", sorted(BAD_FILES))
-def test_a_bad_group_file_is_refused_with_status_2_and_one_line(case: str, tmp_path: Path) -> None:
+def test_a_bad_group_file_is_refused_with_status_2_and_one_line(cli, case: str, tmp_path: Path) -> None:
     body, expected = BAD_FILES[case]
     path = tmp_path / f"{case}.toml"
     path.write_text(f'name = "{case}"\n{body}\n')
-    done = run("check", path.name, cwd=tmp_path)
+    done = cli("check", path.name)
     assert done.returncode == 2
     assert expected in done.stderr
     assert path.name in done.stderr, "the message names the file"
@@ -80,43 +110,43 @@ def test_a_bad_group_file_is_refused_with_status_2_and_one_line(case: str, tmp_p
     ],
 )
 def test_a_bad_steering_task_is_refused_with_status_2(
-    arguments: tuple[str, ...], expected: str, tmp_path: Path
+    cli, arguments: tuple[str, ...], expected: str, tmp_path: Path
 ) -> None:
-    done = run("steer", "so3", *arguments, cwd=tmp_path)
+    done = cli("steer", "so3", *arguments)
     assert done.returncode == 2
     assert expected in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-def test_an_output_folder_that_is_not_ours_is_left_alone(tmp_path: Path) -> None:
+def test_an_output_folder_that_is_not_ours_is_left_alone(cli, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     precious = tmp_path / "mine" / "thesis.txt"
     precious.write_text("years of work")
-    done = run("generate", "h3", "--out", "mine", cwd=tmp_path)
+    done = cli("generate", "h3", "--out", "mine")
     assert done.returncode == 2
     assert "mine is not empty" in done.stderr
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
     blocked = tmp_path / "file"
     blocked.write_text("")
-    assert run("generate", "h3", "--out", "file/inside", cwd=tmp_path).returncode == 2
+    assert cli("generate", "h3", "--out", "file/inside").returncode == 2
 
 
-def test_steer_and_simulate_print_json(tmp_path: Path) -> None:
-    steer = run("steer", "h3", "--target", "0,0,1", "--controls", "x,y", "--json", cwd=tmp_path)
+def test_steer_and_simulate_print_json(cli, tmp_path: Path) -> None:
+    steer = cli("steer", "h3", "--target", "0,0,1", "--controls", "x,y", "--json")
     plan = json.loads(steer.stdout)
     assert abs(plan["cost"] - 12.566370614359172) < 1e-4
-    simulated = run("simulate", "so3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--end", "2*0+1", cwd=tmp_path)
+    simulated = cli("simulate", "so3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--end", "2*0+1")
     assert simulated.returncode == 2, "numbers of options are plain numbers"
-    simulated = run("simulate", "so3", "--u", "0", "--u", "0", "--u", "pi/2", "--end", "1", "--json", cwd=tmp_path)
+    simulated = cli("simulate", "so3", "--u", "0", "--u", "0", "--u", "pi/2", "--end", "1", "--json")
     X = json.loads(simulated.stdout)["X_final"]
     assert max(abs(X[0][1] + 1), abs(X[1][0] - 1), abs(X[0][0])) < 1e-12
 
 
-def test_average_prints_exact_coefficients_and_measures_its_order(tmp_path: Path) -> None:
+def test_average_prints_exact_coefficients_and_measures_its_order(cli, tmp_path: Path) -> None:
     u = ("--u", "cos(t)", "--u", "sin(t)", "--u", "0")
-    done = run("average", "so3", *u, "--order", "3", "--check", "--json", cwd=tmp_path)
+    done = cli("average", "so3", *u, "--order", "3", "--check", "--json")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert result["exact_F"] == [["0", "0", "0"], ["0", "0", "1/2"], ["1/2", "0", "0"]]
     assert result["check"]["passed"]
-    assert run("average", "so3", "--u", "cos(t)", cwd=tmp_path).returncode == 2
+    assert cli("average", "so3", "--u", "cos(t)").returncode == 2
