@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import Any
+from typing import Any, cast
 
 import typer
 
@@ -25,13 +25,13 @@ for _part in (groups.commands, code.commands, motion.commands, averages.commands
         app.command()(_command)
 
 
-def _show_warning(message: Any, category: Any, *rest: Any) -> None:
+def _show_warning(message: Any, *rest: Any, **named: Any) -> None:
     complain(f"lie-codegen: warning: {message}")
 
 
 def main() -> None:
     """Entry point: exit status 2 for bad input with one line, 1 for a computation that failed."""
-    warnings.showwarning = _show_warning
+    warnings.showwarning = cast(Any, _show_warning)
     try:
         app()
     except InputError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import casadi as ca
@@ -16,21 +17,21 @@ class CasadiArithmetic:
     def constant(self, value: Any) -> float:
         return float(value)
 
-    sin = staticmethod(ca.sin)
-    cos = staticmethod(ca.cos)
-    tan = staticmethod(ca.tan)
-    exp = staticmethod(ca.exp)
-    expm1 = staticmethod(ca.expm1)
-    log = staticmethod(ca.log)
-    sqrt = staticmethod(ca.sqrt)
-    sinh = staticmethod(ca.sinh)
-    cosh = staticmethod(ca.cosh)
-    tanh = staticmethod(ca.tanh)
-    acos = staticmethod(ca.acos)
-    asin = staticmethod(ca.asin)
-    atan = staticmethod(ca.atan)
-    atan2 = staticmethod(ca.atan2)
-    fabs = staticmethod(ca.fabs)
+    sin: Callable[..., Any] = staticmethod(ca.sin)
+    cos: Callable[..., Any] = staticmethod(ca.cos)
+    tan: Callable[..., Any] = staticmethod(ca.tan)
+    exp: Callable[..., Any] = staticmethod(ca.exp)
+    expm1: Callable[..., Any] = staticmethod(ca.expm1)
+    log: Callable[..., Any] = staticmethod(ca.log)
+    sqrt: Callable[..., Any] = staticmethod(ca.sqrt)
+    sinh: Callable[..., Any] = staticmethod(ca.sinh)
+    cosh: Callable[..., Any] = staticmethod(ca.cosh)
+    tanh: Callable[..., Any] = staticmethod(ca.tanh)
+    acos: Callable[..., Any] = staticmethod(ca.acos)
+    asin: Callable[..., Any] = staticmethod(ca.asin)
+    atan: Callable[..., Any] = staticmethod(ca.atan)
+    atan2: Callable[..., Any] = staticmethod(ca.atan2)
+    fabs: Callable[..., Any] = staticmethod(ca.fabs)
 
     def less(self, a: Any, b: Any) -> Any:
         return ca.SX(a) < b
