@@ -69,6 +69,8 @@ def test_the_smallest_common_period_is_found() -> None:
     assert PeriodicInput(["cos(2*t/3)", "sin(t/2)"]).period == 12 * sp.pi
     assert PeriodicInput(["cos(2*t)", "sin(4*t)"]).period == sp.pi
     assert PeriodicInput(["cos(2*pi*t)"]).period == 1
+    assert PeriodicInput(["cos(t)"], 2 * np.pi).period == 2 * sp.pi
+    assert PeriodicInput(["cos(t)"], 4 * np.pi).period == 4 * sp.pi
     assert PeriodicInput(["cos(w*t)", "sin(3*w*t)"], parameters=("w",)).period == 2 * sp.pi / sp.Symbol("w", real=True)
 
 
@@ -79,6 +81,8 @@ def test_the_smallest_common_period_is_found() -> None:
         ({"components": ["cos(2*t/3)"], "period": "2*pi"}, PeriodError, "common period 3\\*pi"),
         ({"components": ["cos(t)", "t"], "period": "2*pi"}, PeriodError, "component 2, t, is not periodic"),
         ({"components": ["exp(cos(t))"]}, PeriodError, "give its period"),
+        ({"components": ["tan(t)"], "period": "pi"}, InputError, "singularity"),
+        ({"components": ["cos(t)"], "period": 6.2831853}, PeriodError, "common period 2\\*pi"),
         ({"components": ["cos(t)"], "period": -1}, PeriodError, "not positive"),
         ({"components": ["a*cos(t)"]}, ExpressionError, "no name 'a'"),
         ({"components": [sp.Symbol("a") * sp.cos(sp.Symbol("t"))]}, InputError, "not declared"),

@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from lie_codegen.averaging.trig_signal import Brackets
-from lie_codegen.errors import NotFiniteError
+from lie_codegen.errors import InputError, NotFiniteError
 
 Array = NDArray[np.float64]
 
@@ -85,6 +85,7 @@ def resolve(function: Callable[[Array], Array], period: float, breakpoints: Sequ
 
     Raises:
         NotFiniteError: if the function is NaN or infinite somewhere.
+        InputError: if it has a pole, or varies too fast.
     """
     inside = [b for b in breakpoints if 0 < b < period]
     edges = np.unique(np.concatenate([[0.0, period], inside, np.linspace(0, period, 5)]))
@@ -100,9 +101,21 @@ def resolve(function: Callable[[Array], Array], period: float, breakpoints: Sequ
         scale = max(float(np.max(np.abs(values))), 1e-300)
         rough = (tails > _RESOLVED * scale * np.sqrt(NODES)) & (np.diff(edges) > smallest)
         if not rough.any() or len(edges) > _MOST_PANELS:
+            _check_integrable(panels, values, tails > _RESOLVED * scale * np.sqrt(NODES))
             return panels, values
         middles = (edges[:-1] + edges[1:])[rough] / 2
         edges = np.sort(np.concatenate([edges, middles]))
+
+
+def _check_integrable(panels: Panels, values: Array, rough: NDArray[np.bool_]) -> None:
+    """Panels that stay rough must weigh nothing: a kink or a jump does, a pole does not."""
+    weights = np.diff(panels.edges) * np.max(np.abs(values), axis=(1, 2))
+    if float(np.sum(weights[rough])) > 1e-6 * float(np.sum(weights)):
+        worst = int(np.argmax(np.where(rough, weights, 0.0)))
+        raise InputError(
+            f"the periodic input is not resolved near t = {panels.edges[worst]:.6g}: it has a singularity there, or varies too "
+            f"fast for {_MOST_PANELS} panels of {NODES} nodes; name the times of its jumps as breakpoints"
+        )
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ _LARGEST_MULTIPLE = 1000
 _LARGEST_FREQUENCY = 2**18
 
 
+#: A decimal period this near a common one (relatively) is meant to be it: 6.283185307179586 is 2 pi.
+_SNAP = 4e-15
+
+
 class NotTrigonometricError(Exception):
     """A formula is not a trigonometric polynomial in the time; the caller falls back to quadrature."""
 
@@ -105,6 +109,10 @@ def base_rate(rates: Sequence[sp.Expr], period: sp.Expr | None, where: str) -> s
     if period is None:
         return common
     multiple = sp.cancel(common * period / (2 * sp.pi))
+    if multiple.is_number and not multiple.is_Integer and period.is_Rational:
+        nearest = round(float(multiple))
+        if nearest and abs(float(multiple) / nearest - 1) < _SNAP:
+            return common / nearest
     if not (multiple.is_Integer and multiple > 0):
         raise PeriodError(
             f"{where}: {period} is not a period of the input; its frequencies have the common period "
