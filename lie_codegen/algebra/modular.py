@@ -1,8 +1,7 @@
 """Exact numbers modulo a large prime, for fast tests of polynomial identities.
 
 A number field is mapped into the prime field by sending its generator to a root of its minimal polynomial, a transcendental
-such as pi to a random residue. An identity that fails is then seen to fail at a random point with a probability of at least
-1 - degree / 2^61 (Schwartz and Zippel).
+such as pi to a fixed arbitrary residue. An identity that fails is seen to fail at a random point with a probability of at least 1 - degree / 2^61 (Schwartz and Zippel).
 """
 
 from __future__ import annotations
@@ -27,9 +26,12 @@ def modular_images(values: Sequence[Number]) -> tuple[int, list[int]] | None:
     domain, elements = field_elements(values)
     if domain.is_QQ:
         return _PRIME, [_rational(_PRIME, value) for value in elements]
-    if not getattr(domain, "is_AlgebraicField", False):
-        return None
-    return _algebraic(domain, elements)
+    if getattr(domain, "is_AlgebraicField", False):
+        return _algebraic(domain, elements)
+    if domain.is_FractionField and (domain.dom.is_QQ or domain.dom.is_ZZ):
+        residues = random_point(random.Random(0), _PRIME, domain.ngens)
+        return _PRIME, [_quotient(_PRIME, residues, element) for element in elements]
+    return None
 
 
 def _algebraic(domain: Any, elements: Sequence[Any]) -> tuple[int, list[int]] | None:
@@ -52,6 +54,22 @@ def _evaluated(prime: int, root: int, domain: Any, element: Any) -> int:
     total = 0
     for c in element.to_list():
         total = (total * root + _rational(prime, c)) % prime
+    return total
+
+
+def _quotient(prime: int, residues: list[int], element: Any) -> int:
+    """A rational function of the generators at the residues."""
+    above, below = (
+        sum(_rational(prime, c) * _monomial(prime, residues, powers) for powers, c in part.terms()) % prime
+        for part in (element.numer, element.denom)
+    )
+    return above * pow(below, -1, prime) % prime
+
+
+def _monomial(prime: int, residues: list[int], powers: Sequence[int]) -> int:
+    total = 1
+    for residue, power in zip(residues, powers, strict=True):
+        total = total * pow(residue, power, prime) % prime
     return total
 
 

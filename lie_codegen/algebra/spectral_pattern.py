@@ -1,4 +1,4 @@
-"""Annihilating polynomials lambda^k (lambda^2 + q(x))^m of a linear family of matrices, found exactly.
+"""Annihilating polynomials lambda^k (lambda^2 + q(x))^m of a linear family of matrices.
 
 For A(x) = sum_i x_i A_i and a unit vector e_j the smallest k, m and a quadratic form q with
 
@@ -6,8 +6,8 @@ For A(x) = sum_i x_i A_i and a unit vector e_j the smallest k, m and a quadratic
 
 give every analytic f(A(x)) e_j in closed form: so3, se2, se3, SE_2(3), su2, sl2 and every nilpotent algebra have one.
 The form follows from the trace, q = -tr A^2 / (2 r) on the coordinates that e_j reaches, where 2 r eigenvalues differ from
-zero. The identity, polynomial in x of degree below 20, is tested in exact arithmetic at seeded integer points from a range
-of 2^40: it holds, or the three tests all fail to see it with a probability below 10^-30 (Schwartz and Zippel).
+zero. The identity, polynomial in x of degree below 20, is tested at two random points modulo a prime near 2^61: it holds, or
+both tests fail to see it with a probability below 10^-30.
 """
 
 from __future__ import annotations
@@ -16,20 +16,21 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
-from typing import Any
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number, field_elements
+from lie_codegen.algebra.exact import Number
+from lie_codegen.algebra.modular import modular_images, random_point
 from lie_codegen.algebra.quadratic_form import QuadraticForm
 
-_POINTS = 3
-_RANGE = 2**39
+_POINTS = 2
 _MOST_ZEROS = 4
 _MOST_PAIRS = 3
 
-#: position -> exact field element
-_Vector = dict[int, Any]
+#: row -> residue, no zeros.
+_Vector = dict[int, int]
+#: For each point the value of a quadratic form.
+_Values = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -51,91 +52,85 @@ class ColumnPattern:
 
 def spectral_pattern(matrices: Sequence[sp.MatrixBase]) -> tuple[ColumnPattern, ...] | None:
     """The pattern of every column, or None when a column has none of this kind."""
-    return _Family(matrices).pattern()
+    family = _Family(matrices)
+    result = []
+    for j in range(family.size):
+        column = family.column_pattern(j)
+        if column is None:
+            return None
+        result.append(column)
+    return tuple(result)
 
 
 class _Family:
     def __init__(self, matrices: Sequence[sp.MatrixBase]) -> None:
         self.size = int(matrices[0].rows)
-        positions = [
-            (i, r, c, m[r, c])
-            for i, m in enumerate(matrices)
-            for r in range(self.size)
-            for c in range(self.size)
-            if m[r, c] != 0
-        ]
-        domain, values = field_elements([value for *_, value in positions] or [sp.S.Zero])
-        self.domain = domain
         self.entries = [
-            (i, r, c, value) for (i, r, c, _), value in zip(positions, values if positions else [], strict=True)
+            (i, *divmod(place, self.size), value)
+            for i, m in enumerate(matrices)
+            for place, value in enumerate(m.flat())
+            if value != 0
         ]
-        rng = random.Random(0)
-        self.points = [
-            [domain.convert(rng.randint(-_RANGE, _RANGE)) for _ in range(len(matrices))] for _ in range(_POINTS)
-        ]
-        self.columns = [self._columns(point) for point in self.points]
-        self.forms: dict[frozenset[int], tuple[_Form, ...]] = {}
+        images = modular_images([value for *_, value in self.entries]) if self.entries else (2**61 - 1, [])
+        self.known = images is not None
+        self.prime, self.residues = images if images is not None else (2**61 - 1, [])
+        self.points = [random_point(random.Random(k), self.prime, len(matrices)) for k in range(_POINTS)]
+        self.columns = [self._columns_at(point) for point in self.points]
+        self.forms: dict[frozenset[int], list[_Values]] = {}
 
-    def _columns(self, point: list[Any]) -> list[_Vector]:
+    def _columns_at(self, point: list[int]) -> list[_Vector]:
         columns: list[_Vector] = [{} for _ in range(self.size)]
-        for i, r, c, value in self.entries:
-            columns[c][r] = columns[c].get(r, self.domain.zero) + value * point[i]
+        for (i, r, c, _), value in zip(self.entries, self.residues, strict=False):
+            columns[c][r] = (columns[c].get(r, 0) + value * point[i]) % self.prime
         return columns
 
-    def pattern(self) -> tuple[ColumnPattern, ...] | None:
-        result = []
-        for j in range(self.size):
-            column = self._column_pattern(j)
-            if column is None:
-                return None
-            result.append(column)
-        return tuple(result)
-
-    def _column_pattern(self, j: int) -> ColumnPattern | None:
+    def column_pattern(self, j: int) -> ColumnPattern | None:
+        if not self.known:
+            return None
         krylov = [self._krylov(p, j) for p in range(_POINTS)]
         for zeros in range(1, self.size + 1):
             if all(not k[zeros] for k in krylov):
-                return ColumnPattern(zeros, 0, None, self._supports(krylov, None, zeros, 0))
+                return ColumnPattern(zeros, 0, None, self._supports(krylov, (0,) * _POINTS, zeros, 0))
+        rows = self._reach(j)
         for pairs in range(1, _MOST_PAIRS + 1):
             for zeros in range(_MOST_ZEROS + 1):
-                for form in self._forms(self._reach(j)):
-                    if all(not self._value(k, q, zeros, pairs) for k, q in zip(krylov, form.values, strict=True)):
-                        supports = self._supports(krylov, form, zeros, pairs)
-                        return ColumnPattern(zeros, pairs, form.form, supports)
+                for r, q in enumerate(self._forms(rows), start=1):
+                    if all(not self._value(k, value, zeros, pairs) for k, value in zip(krylov, q, strict=True)):
+                        return ColumnPattern(
+                            zeros, pairs, self._exact(rows, r), self._supports(krylov, q, zeros, pairs)
+                        )
         return None
 
     def _krylov(self, p: int, j: int) -> list[_Vector]:
-        vectors: list[_Vector] = [{j: self.domain.one}]
+        vectors: list[_Vector] = [{j: 1}]
         for _ in range(max(self.size, _MOST_ZEROS + 2 * _MOST_PAIRS)):
             image: _Vector = {}
             for c, x in vectors[-1].items():
                 for r, a in self.columns[p][c].items():
-                    image[r] = image.get(r, self.domain.zero) + a * x
+                    image[r] = (image.get(r, 0) + a * x) % self.prime
             vectors.append({r: value for r, value in image.items() if value})
         return vectors
 
-    def _value(self, krylov: list[_Vector], q: Any, power: int, pairs: int) -> _Vector:
+    def _value(self, krylov: list[_Vector], q: int, power: int, pairs: int) -> _Vector:
         total: _Vector = {}
         for s in range(pairs + 1):
-            weight = self.domain.convert(comb(pairs, s)) * q ** (pairs - s)
+            weight = comb(pairs, s) * pow(q, pairs - s, self.prime)
             for r, value in krylov[power + 2 * s].items():
-                total[r] = total.get(r, self.domain.zero) + weight * value
+                total[r] = (total.get(r, 0) + weight * value) % self.prime
         return {r: value for r, value in total.items() if value}
 
     def _supports(
-        self, krylov: list[list[_Vector]], form: _Form | None, zeros: int, pairs: int
+        self, krylov: list[list[_Vector]], q: _Values, zeros: int, pairs: int
     ) -> tuple[tuple[tuple[int, int], frozenset[int]], ...]:
         wanted = [(power, 0) for power in range(zeros + 2 * pairs)]
-        if form is not None:
-            wanted += [(power, s) for s in range(1, pairs) for power in range(zeros + 2 * (pairs - s))]
-        result = []
-        for power, s in wanted:
-            rows: set[int] = set()
-            for p in range(_POINTS):
-                q = form.values[p] if form is not None else self.domain.zero
-                rows |= set(self._value(krylov[p], q, power, s))
-            result.append(((power, s), frozenset(rows)))
-        return tuple(result)
+        wanted += [(power, s) for s in range(1, pairs) for power in range(zeros + 2 * (pairs - s))]
+        return tuple(
+            (
+                (power, s),
+                frozenset(r for k, value in zip(krylov, q, strict=True) for r in self._value(k, value, power, s)),
+            )
+            for power, s in wanted
+        )
 
     def _reach(self, j: int) -> frozenset[int]:
         reached, new = {j}, [j]
@@ -147,41 +142,28 @@ class _Family:
                     new.append(r)
         return frozenset(reached)
 
-    def _forms(self, rows: frozenset[int]) -> tuple[_Form, ...]:
-        """q = -tr A^2 / (2 r) on the coordinates `rows`, for each possible r; none if the trace vanishes."""
+    def _forms(self, rows: frozenset[int]) -> list[_Values]:
+        """q = -tr A^2 / (2 r) on the coordinates `rows` at the points, for r = 1, 2, ...; none if the trace vanishes."""
         if rows not in self.forms:
-            trace = self._trace_of_square(rows)
-            self.forms[rows] = tuple(self._form(trace, r) for r in range(1, len(rows) // 2 + 1)) if trace else ()
+            traces = []
+            for columns in self.columns:
+                total = sum(a * columns[r].get(c, 0) for c in rows for r, a in columns[c].items() if r in rows)
+                traces.append(total % self.prime)
+            shares = [pow(-2 * r, -1, self.prime) for r in range(1, len(rows) // 2 + 1)] if any(traces) else []
+            self.forms[rows] = [tuple(t * share % self.prime for t in traces) for share in shares]
         return self.forms[rows]
 
-    def _trace_of_square(self, rows: frozenset[int]) -> dict[tuple[int, int], Any]:
-        inside = [entry for entry in self.entries if entry[1] in rows and entry[2] in rows]
-        trace: dict[tuple[int, int], Any] = {}
-        by_place: dict[tuple[int, int], list[tuple[int, Any]]] = {}
-        for i, r, c, value in inside:
-            by_place.setdefault((r, c), []).append((i, value))
-        for i, r, c, value in inside:
-            for k, other in by_place.get((c, r), []):
-                key = (min(i, k), max(i, k))
-                trace[key] = trace.get(key, self.domain.zero) + value * other
-        return {key: value for key, value in trace.items() if value}
-
-    def _form(self, trace: dict[tuple[int, int], Any], r: int) -> _Form:
-        scale = self.domain.convert(-2 * r)
-        scaled = {key: value / scale for key, value in trace.items()}
-        values = []
-        for point in self.points:
-            total = self.domain.zero
-            for (i, k), value in scaled.items():
-                total = total + value * point[i] * point[k]
-            values.append(total)
-        exact: list[tuple[tuple[int, int], Number]] = [
-            (key, self.domain.to_sympy(value)) for key, value in sorted(scaled.items())
-        ]
-        return _Form(QuadraticForm(tuple(exact)), tuple(values))
-
-
-@dataclass(frozen=True)
-class _Form:
-    form: QuadraticForm
-    values: tuple[Any, ...]
+    def _exact(self, rows: frozenset[int], r: int) -> QuadraticForm:
+        """The same q as an exact polynomial."""
+        by_place: dict[tuple[int, int], list[tuple[int, Number]]] = {}
+        for i, row, c, value in self.entries:
+            if row in rows and c in rows:
+                by_place.setdefault((row, c), []).append((i, value))
+        trace: dict[tuple[int, int], Number] = {}
+        for (row, c), entries in by_place.items():
+            for i, value in entries:
+                for k, other in by_place.get((c, row), []):
+                    key = (min(i, k), max(i, k))
+                    trace[key] = trace.get(key, sp.S.Zero) + value * other
+        exact = {key: sp.radsimp(sp.expand(value)) / (-2 * r) for key, value in trace.items()}
+        return QuadraticForm(tuple((key, value) for key, value in sorted(exact.items()) if value != 0))

@@ -7,7 +7,7 @@ matrix; `exp` and `log` are those of the matrix; `rjac` belongs to body velociti
 |---|---|---|---|---|---|
 | lie_codegen | omega, vx, vy | w, v | X exp(v) | left and right | none: matrices |
 | scipy (Rotation, RigidTransform) | - | w, v | - | - | x, y, z, w |
-| jaxlie | vx, vy, omega | v, w | X exp(v) | left | w, x, y, z |
+| jaxlie | vx, vy, omega | v, w | X exp(v) | inverse right (jlog) | w, x, y, z |
 | pinocchio | vx, vy, omega | v, w | X exp(v) | right (Jexp3, Jexp6) | x, y, z, w |
 | gtsam | vx, vy, omega | w, v | X exp(v) | right (ExpmapDerivative) | w, x, y, z (Rot3.Quaternion) |
 | Sophus | vx, vy, omega | v, w | X exp(v) | left (leftJacobian) | x, y, z, w |

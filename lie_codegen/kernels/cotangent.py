@@ -32,7 +32,7 @@ class CotangentFunctions:
             return
         size = ops.fabs(z) if signed else z
         self.near = ops.less(size, SWITCH)
-        self.inner = ops.where(self.near, z, 0)
+        self.inner = ops.where(self.near, z, 1)
         self.outer = ops.where(self.near, SWITCH, z)
         self.signed = signed
         self._outer: dict[tuple[int, int], Scalar] = {}
@@ -103,10 +103,9 @@ def _power(x: Scalar, exponent: int) -> Scalar:
 @cache
 def four_pi_squared() -> Fraction:
     """4 pi^2 to 60 digits."""
-    import mpmath
+    import sympy as sp
 
-    with mpmath.workdps(70):
-        return Fraction(mpmath.nstr(4 * mpmath.pi**2, 60))
+    return Fraction(str(sp.N(4 * sp.pi**2, 60)))
 
 
 @cache

@@ -17,8 +17,8 @@ from lie_codegen.kernels.block_solve import is_zero
 
 #: |z| below which the two highest functions are summed as series; above it sine and cosine go up the recurrence.
 SWITCH = 1
-#: With the switch at 1 the first term left out is below 1e-21 relative, and below 1e-18 in second derivatives.
-TERMS = 11
+#: With the switch at 1 the first term left out is below 1e-19 relative, and below 1e-16 in second derivatives.
+TERMS = 10
 #: Kernels that climb beyond c_3 switch later: each step of the recurrence from c_0 up divides rounding errors by z.
 HIGH_SWITCH = 6
 HIGH_TERMS = 18
