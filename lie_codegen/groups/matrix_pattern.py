@@ -59,6 +59,19 @@ class RealMatrices:
             {divmod(p, self.size): value for p, value in zip(pivots, row, strict=True) if value != 0} for row in inverse
         )
 
+    @cached_property
+    def rigid(self) -> tuple[int, ...] | None:
+        """Where w1 w2 w3 (and v1 v2 v3) of the usual SO(3) or SE(3) stand in the basis; None for other groups.
+
+        There Ad has a closed form: Ad_R w = R w, Ad_(R, p) (w, v) = (R w, R v + p x R w).
+        """
+        if self.group.is_complex or (self.size, self.group.dim) not in ((3, 3), (4, 6)):
+            return None
+        place = {tuple(matrix.flat()): index for index, matrix in enumerate(self.basis)}
+        found = [place.get(tuple(matrix.flat())) for matrix in _rigid_basis(self.size)]
+        positions = tuple(index for index in found if index is not None)
+        return positions if len(positions) == self.group.dim else None
+
     def _orthogonal(self, block: list[int]) -> bool:
         return all(m[i, j] == -m[j, i] for m in self.basis for i in block for j in block)
 
@@ -69,3 +82,17 @@ def real_form(matrix: sp.MatrixBase, is_complex: bool) -> sp.MatrixBase:
         return matrix
     re, im = matrix.applyfunc(sp.re), matrix.applyfunc(sp.im)
     return sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re))
+
+
+def _rigid_basis(size: int) -> list[sp.ImmutableMatrix]:
+    """Rotations about the three axes, and for size 4 translations along them."""
+    result = []
+    for j, k in ((1, 2), (2, 0), (0, 1)):
+        turn = sp.zeros(size, size)
+        turn[k, j], turn[j, k] = 1, -1
+        result.append(sp.ImmutableMatrix(turn))
+    for i in range(3 if size == 4 else 0):
+        shift = sp.zeros(size, size)
+        shift[i, 3] = 1
+        result.append(sp.ImmutableMatrix(shift))
+    return result

@@ -12,7 +12,7 @@ from lie_codegen.kernels.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, product, solve
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.kernel import Port
-from lie_codegen.kernels.linear import Matrix, Vector, dot, matmul, minus, number, scaled
+from lie_codegen.kernels.linear import Matrix, Vector, cross, dot, matmul, matvec, minus, number, plus, scaled
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, product_exp
 
 
@@ -71,7 +71,21 @@ class GroupMatrices:
 
     def Ad(self, X: Matrix, X_inverse: Matrix, x: Sequence[Scalar]) -> Vector:
         """Ad_X x, coordinates of X hat(x) X^{-1}."""
+        rigid = self.real.rigid
+        if rigid is not None:
+            return self._rigid_adjoint(X, [x[index] for index in rigid], rigid)
         return self.vee(matmul(X, matmul(self.hat(x), X_inverse)))
+
+    def _rigid_adjoint(self, X: Matrix, x: Sequence[Scalar], places: Sequence[int]) -> Vector:
+        """Ad_(R, p) (w, v) = (R w, R v + p x R w), put back in the order of the basis."""
+        R = [row[:3] for row in X[:3]]
+        value = matvec(R, x[:3])
+        if len(x) == 6:
+            value = value + plus(matvec(R, x[3:]), cross([row[3] for row in X[:3]], value))
+        result: Vector = [0] * len(x)
+        for place, entry in zip(places, value, strict=True):
+            result[place] = entry
+        return result
 
     def _block_inverse(self, block: Matrix, orthogonal: bool) -> Matrix:
         if orthogonal:
