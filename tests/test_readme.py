@@ -48,3 +48,12 @@ def _environment(repository: Path) -> dict[str, str]:
     import os
 
     return {**os.environ, "PYTHONPATH": str(repository)}
+
+
+def test_the_table_of_groups_is_current(repository: Path) -> None:
+    from lie_codegen.gallery.catalogue_table import catalogue_table
+
+    text = (repository / "README.md").read_text(encoding="utf-8")
+    shown = re.search(r"<!-- catalogue-table -->\n(.*?)<!-- end of catalogue-table -->", text, flags=re.DOTALL)
+    assert shown is not None
+    assert shown.group(1) == catalogue_table()

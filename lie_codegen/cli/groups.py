@@ -16,8 +16,17 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 GroupName = Annotated[str, typer.Argument(help="A catalogue name, or the path of a group file (.toml).")]
 
 
-def list_groups(json: Json = False) -> None:
+def list_groups(
+    table: Annotated[bool, typer.Option("--table", help="The README's Markdown table, with times to derive.")] = False,
+    json: Json = False,
+) -> None:
     """List the catalogue."""
+    if table:
+        from lie_codegen.gallery.catalogue_table import catalogue_table
+
+        text = catalogue_table(with_times=True)
+        emit(text, {"table": text}, json)
+        return
     from lie_codegen.groups.catalogue_load import group
     from lie_codegen.groups.catalogue_names import group_names
 
