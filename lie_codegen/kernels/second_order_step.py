@@ -27,6 +27,7 @@ from lie_codegen.kernels.linear import Vector, bracket, matmul, plus, scaled
 from lie_codegen.kernels.mechanics_kernels import acceleration_body
 from lie_codegen.kernels.reference_kernels import ReferenceBody
 from lie_codegen.kernels.rkmk import times_taylor_exp
+from lie_codegen.kernels.tracking_kernels import force_units
 from lie_codegen.kernels.wei_norman_body import WeiNormanData
 
 #: (ops, t, X, xi) -> (n,) body force.
@@ -110,6 +111,43 @@ def second_order_step(
         outputs=(Port("state_next", (size + group.dim,)),),
         body=body,
         formula="X' = X hat(xi), I xi' = ad*_xi I xi + f: one RKMK4 step",
+        source="Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)",
+        sampler=sampler,
+    )
+
+
+def held_force_step(group: MatrixGroup, inertia: Any, name: str = "held_force_step") -> Kernel:
+    """The step (state, force, h) -> (state_next,) under a constant body force, as a sampled controller gives it.
+
+    Raises:
+        InputError: the inertia is not symmetric positive definite.
+    """
+    metric = positive_matrix(inertia, group.dim, "inertia")
+    size, move = packed_size(group), Move(group)
+
+    def body(ops: Arithmetic, state: Vector, force: Vector, h: Scalar) -> tuple[Any, ...]:
+        X, xi = unpack(group, state[:size]), list(state[size:])
+        Theta, change = increments(ops, move, metric, lambda *_: list(force), X, xi, 0, h)
+        return ([*pack(group, move(ops, X, Theta)), *plus(xi, change)],)
+
+    data = WeiNormanData(group)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        xi, force = ([rng.uniform(-1, 1) for _ in range(group.dim)] for _ in range(2))
+        return [*pack(group, random_element(group, data, rng)), *xi], force, rng.uniform(0, 0.05)
+
+    port = (size + group.dim,)
+    return Kernel(
+        name=name,
+        namespace=group.name,
+        inputs=(
+            Port("state", port, description="varying entries of X, row by row, then xi"),
+            Port("force", (group.dim,), force_units(group), description="body force, constant over the step"),
+            Port("h", (), "s"),
+        ),
+        outputs=(Port("state_next", port),),
+        body=body,
+        formula="X' = X hat(xi), I xi' = ad*_xi I xi + f with constant f: one RKMK4 step",
         source="Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)",
         sampler=sampler,
     )
