@@ -13,7 +13,9 @@ from lie_codegen.cli.output import emit
 
 def average(
     group: GroupName,
-    u: Annotated[list[str], typer.Option("--u", help='Formula of t, one for each basis element: --u "cos(t)" --u 0 ...')],
+    u: Annotated[
+        list[str], typer.Option("--u", help='Formula of t, one for each basis element: --u "cos(t)" --u 0 ...')
+    ],
     period: Annotated[str, typer.Option(help="Period of u; pi and sqrt allowed.")] = "2*pi",
     order: Annotated[int, typer.Option(help="Order of the average.")] = 2,
     form: Annotated[str, typer.Option(help="floquet (any order, any mean), product or single.")] = "floquet",

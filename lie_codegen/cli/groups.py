@@ -13,6 +13,8 @@ from lie_codegen.errors import OutputFolderError
 from lie_codegen.identifiers import check_identifier
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+#: Dimension up to which M(g) is printed unasked.
+_SHOWN = 6
 GroupName = Annotated[str, typer.Argument(help="A catalogue name, or the path of a group file (.toml).")]
 
 
@@ -40,13 +42,23 @@ def list_groups(
     emit("\n".join(rows), {"groups": data}, json)
 
 
-def show(group: GroupName, json: Json = False) -> None:
-    """Show a group: basis, brackets, Wei-Norman matrix and determinant, exact."""
+def show(
+    group: GroupName,
+    matrix: Annotated[
+        bool | None, typer.Option("--matrix/--no-matrix", help="Print M(g); by default up to dimension 6.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Show a group: basis, brackets, structure, Wei-Norman matrix, chart and a better order, all exact."""
     from lie_codegen.groups.catalogue_load import group as load
+    from lie_codegen.groups.structure import structure
+    from lie_codegen.kernels.chart_domain import chart_domain
     from lie_codegen.kernels.wei_norman import wei_norman
+    from lie_codegen.kernels.wei_norman_order import wei_norman_order
 
     g = load(group)
-    wn = wei_norman(g)
+    domain, order = chart_domain(g), wei_norman_order(g)
+    rows = wei_norman(g).M.tolist() if (g.dim <= _SHOWN if matrix is None else matrix) else []
     data = {
         "name": g.name,
         "description": g.description,
@@ -56,17 +68,23 @@ def show(group: GroupName, json: Json = False) -> None:
         "labels": g.labels,
         "units": g.units,
         "brackets": _brackets(g),
-        "wei_norman_matrix": [[str(entry) for entry in row] for row in wn.M.tolist()],
-        "determinant_of_inverse": str(wn.determinant),
+        "structure": structure(g).kind,
+        "wei_norman_matrix": [[str(entry) for entry in row] for row in rows],
+        "determinant_of_inverse": str(domain.determinant),
+        "chart": domain.text,
+        "recommended_order": order.labels,
+        "recommended_because": order.reason,
     }
     lines = [
         f"{g.name}: {g.description or 'no description'}",
-        f"dimension {g.dim}, {g.degree} x {g.degree} {'complex' if g.is_complex else 'real'} matrices",
+        f"dimension {g.dim}, {g.degree} x {g.degree} {'complex' if g.is_complex else 'real'} matrices, {data['structure']}",
         "basis     " + ", ".join(f"{a} [{b}]" if b else a for a, b in zip(g.labels, g.units, strict=True)),
         "brackets  " + ("; ".join(f"{pair} = {value}" for pair, value in _brackets(g).items()) or "none"),
         "g' = M(g) u for X = " + " ".join(f"exp(g{i} {a})" for i, a in enumerate(g.labels, start=1)),
-        *(f"  M[{i}] = [{', '.join(map(str, row))}]" for i, row in enumerate(wn.M.tolist(), start=1)),
-        f"  det M^-1 = {wn.determinant}",
+        *(f"  M[{i}] = [{', '.join(map(str, row))}]" for i, row in enumerate(rows, start=1)),
+        f"  det M^-1 = {domain.determinant}",
+        f"chart     {domain.text}",
+        f"order     {', '.join(order.labels)}: {order.reason}",
     ]
     emit("\n".join(lines), data, json)
 
