@@ -119,7 +119,7 @@ def quaternion_from_rotation(R: ArrayLike, *, order: str) -> Array:
     """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), with w >= 0; `order` is "wxyz" or "xyzw".
 
     Of the rows of 4 q q^T the one with the largest diagonal entry is normalised, so that no digit is lost at any angle. At w = 0
-    the component of largest modulus is positive. Shepperd, J. Guidance Control 1 (1978) 223.
+    the component of largest modulus is positive. (Shepperd's choice.)
 
     Raises:
         InputError: another order.

@@ -30,7 +30,14 @@ from lie_codegen.kernels.linear import bracket, identity, matmul
 from lie_codegen.kernels.logarithm import log_coordinates
 
 _WEI_NORMAN = "Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and Krishnaprasad, TR 93-59, (12)-(15)"
-_JACOBIANS = "Rossmann, Lie Groups (2002), 1.2, Theorem 5"
+_JACOBIANS = (
+    "ljac(x) = sum_k ad_x^k / (k + 1)!, rjac(x) = ljac(-x); exp(x)' = hat(ljac x') exp(x) = exp(x) hat(rjac x')"
+)
+_EXP = "the power series, summed in closed form on the spectrum of hat(x)"
+_LOG = "the inverse of exp; principal: eigenvalues of hat(x) have imaginary parts in (-pi, pi]"
+_AD = "X' = X hat(u) = hat(Ad_X u) X"
+_BRACKET = "the structure constants: [A_i, A_j] = sum_k c_ijk A_k"
+_PRODUCT = "the group's own product"
 
 
 def group_kernels(group: MatrixGroup) -> tuple[Kernel, ...]:
@@ -93,7 +100,7 @@ def _log(data: GroupDerivation) -> Kernel:
         return (log_coordinates(ops, data, X),)
 
     formula = "exp(x_1 A_1 + ... + x_n A_n) = X, principal"
-    return _kernel(data, "log", [_matrix(data, "X")], [_vector(data, "x")], body, formula, "")
+    return _kernel(data, "log", [_matrix(data, "X")], [_vector(data, "x")], body, formula, _LOG)
 
 
 def _compose(data: GroupDerivation) -> Kernel:
@@ -104,7 +111,7 @@ def _compose(data: GroupDerivation) -> Kernel:
         return (matrices.write(matmul(matrices.read(X), right)),)
 
     inputs = [_matrix(data, "X"), _matrix(data, "Y")]
-    return _kernel(data, "compose", inputs, [_matrix(data, "Z")], body, "Z = X Y", "")
+    return _kernel(data, "compose", inputs, [_matrix(data, "Z")], body, "Z = X Y", _PRODUCT)
 
 
 def _inverse(data: GroupDerivation) -> Kernel:
@@ -112,7 +119,9 @@ def _inverse(data: GroupDerivation) -> Kernel:
         matrices = GroupMatrices(ops, data.real)
         return (matrices.write(matrices.inverse(matrices.read(X))),)
 
-    return _kernel(data, "inverse", [_matrix(data, "X")], [_matrix(data, "X_inverse")], body, "X X_inverse = I", "")
+    return _kernel(
+        data, "inverse", [_matrix(data, "X")], [_matrix(data, "X_inverse")], body, "X X_inverse = I", _PRODUCT
+    )
 
 
 def _group_adjoint(data: GroupDerivation) -> Kernel:
@@ -124,14 +133,14 @@ def _group_adjoint(data: GroupDerivation) -> Kernel:
         return ([list(row) for row in zip(*columns, strict=True)],)
 
     formula = "hat(Ad_X y) = X hat(y) X^{-1}"
-    return _kernel(data, "Ad", [_matrix(data, "X")], [_square(data, "Ad_X")], body, formula, "")
+    return _kernel(data, "Ad", [_matrix(data, "X")], [_square(data, "Ad_X")], body, formula, _AD)
 
 
 def _algebra_adjoint(data: GroupDerivation) -> Kernel:
     def body(ops: Arithmetic, x: Any) -> tuple[Any, ...]:
         return (ad_body(ops, data, x),)
 
-    return _kernel(data, "ad", [_vector(data, "x")], [_square(data, "ad_x")], body, "ad_x y = [x, y]", "")
+    return _kernel(data, "ad", [_vector(data, "x")], [_square(data, "ad_x")], body, "ad_x y = [x, y]", _BRACKET)
 
 
 def _bracket(data: GroupDerivation) -> Kernel:
@@ -139,7 +148,7 @@ def _bracket(data: GroupDerivation) -> Kernel:
         return (bracket(ops, data.group.algebra, x, y),)
 
     inputs = [_vector(data, "x"), _vector(data, "y")]
-    return _kernel(data, "bracket", inputs, [Port("z", (data.group.dim,))], body, "z = [x, y]", "")
+    return _kernel(data, "bracket", inputs, [Port("z", (data.group.dim,))], body, "z = [x, y]", _BRACKET)
 
 
 def _jacobian(side: str, inverse: bool) -> Callable[[GroupDerivation], Kernel]:

@@ -49,7 +49,7 @@ def space_log(ops: Arithmetic, R: Entries, size: Scalar = 1) -> list[Scalar]:
 
     The quaternion is the row of 4 q q^T with the largest diagonal entry, so that nothing cancels at any angle. At 180 degrees both
     signs are logarithms: the component of largest modulus (the first of equals) is made positive.
-    Shepperd, J. Guidance Control 1 (1978) 223.
+    (Shepperd's choice.)
     """
     a, b, c = R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1]
     d, e, f = R[0][1] + R[1][0], R[0][2] + R[2][0], R[1][2] + R[2][1]

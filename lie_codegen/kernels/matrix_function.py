@@ -7,7 +7,7 @@ With mu = lambda^2 and f(lambda) = even(mu) + lambda odd(mu), Newton's interpola
                A odd and a = floor(k/2) in place of ceil(k/2),
 
 where even_i are Taylor coefficients and the divided differences are derivatives in mu of the tails of the series: smooth in
-x, entire for exp and (e^t - 1)/t. Higham, Functions of Matrices (2008), 1.2.3 and 4.2.
+x, entire for exp and (e^t - 1)/t. (Hermite interpolation on the spectrum, the definition of a function of a matrix.)
 """
 
 from __future__ import annotations

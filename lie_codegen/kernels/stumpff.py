@@ -3,8 +3,7 @@
     c_0 = cos sqrt z,  c_1 = sin sqrt z / sqrt z,  c_2 = (1 - cos sqrt z) / z,  c_3 = (sqrt z - sin sqrt z) / z^(3/2),
     c_k = 1/k! - z c_{k+2},     d c_k / d mu = (c_{k+1} - k c_{k+2}) / 2 with mu = -z.
 
-They are entire; cosh and sinh take over for z < 0. Stumpff, Himmelsmechanik I (1959); K. Stumpff's recurrences as in
-Danby, Fundamentals of Celestial Mechanics, 6.9.
+They are entire; cosh and sinh take over for z < 0. The recurrences follow from the series term by term.
 """
 
 from __future__ import annotations
