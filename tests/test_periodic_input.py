@@ -11,7 +11,8 @@ from scipy.linalg import expm
 import lie_codegen as lc
 from lie_codegen.averaging.areas import areas
 from lie_codegen.averaging.coefficients import CoefficientRing
-from lie_codegen.averaging.periodic_input import TIME, PeriodicInput
+from lie_codegen.averaging.input_formulas import TIME
+from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.errors import AssumptionWarning, ExpressionError, InputError, NotFiniteError, PeriodError, ShapeError
 from lie_codegen.studies.reference_flow import reference_flow
 

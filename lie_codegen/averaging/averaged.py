@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.averaging.areas import areas, moments
 from lie_codegen.averaging.batched_exponential import expm
 from lie_codegen.averaging.floquet import floquet_magnus
+from lie_codegen.averaging.input_formulas import TIME
 from lie_codegen.averaging.nilpotent import nilpotency_step
-from lie_codegen.averaging.periodic_input import TIME, PeriodicInput
+from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.averaging.batched_exponential import expm
 from lie_codegen.averaging.floquet import bernoulli
-from lie_codegen.averaging.periodic_input import TIME, PeriodicInput
+from lie_codegen.averaging.input_formulas import TIME
+from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 

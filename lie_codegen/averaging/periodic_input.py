@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,19 +11,27 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.algebra.exact import exact_number
-from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.averaging.input_formulas import (
+    TIME,
+    coefficients_of,
+    exact_value,
+    formula_of,
+    formula_waveform,
+    number_of,
+    period_of,
+    pieces_function,
+    rows_of,
+    symbol_of,
+)
 from lie_codegen.averaging.piecewise_waveform import piecewise_waveform
 from lie_codegen.averaging.sampled_signal import resolve
-from lie_codegen.averaging.trig_formula import NotTrigonometricError, trig_form
+from lie_codegen.averaging.trig_formula import NotTrigonometricError
 from lie_codegen.averaging.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
 
-Array = NDArray[np.float64]
+__all__ = ["TIME", "PeriodicInput"]
 
-#: The time in every formula.
-TIME = sp.Symbol("t", real=True)
-_PERIODIC_TO = 1e-9
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +67,9 @@ class PeriodicInput:
             raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {self.components!r}")
         object.__setattr__(self, "components", tuple(self.components))
         if self.waveform is None:
-            object.__setattr__(self, "waveform", _waveform(self))
+            object.__setattr__(
+                self, "waveform", formula_waveform(self.components, self.period, names, self.breakpoints)
+            )
         object.__setattr__(self, "period", self.waveform.period)
         inside = tuple(sorted(float(b) for b in self.breakpoints))
         object.__setattr__(self, "breakpoints", inside)
@@ -79,15 +89,15 @@ class PeriodicInput:
             ShapeError: if the three do not agree in n.
             NotFiniteError: NaN or infinity.
         """
-        c, s = _coefficients(cosines, "cosines"), _coefficients(sines, "sines")
-        m = _coefficients([] if mean is None else [mean], "mean")
+        c, s = coefficients_of(cosines, "cosines"), coefficients_of(sines, "sines")
+        m = coefficients_of([] if mean is None else [mean], "mean")
         widths = {len(row) for table in (c, s, m) for row in table}
         if len(widths) != 1:
             raise ShapeError(
                 f"PeriodicInput.from_fourier: the coefficients have {sorted(widths)} components; give one n"
             )
         [n] = widths
-        omega = 2 * sp.pi / _number(period, "period", {})
+        omega = 2 * sp.pi / period_of(period, {})
         zero = [sp.S.Zero] * n
         terms = [list(m[0]) if m else zero]
         terms += [[a * sp.cos((k + 1) * omega * TIME) for a in row] for k, row in enumerate(c)]
@@ -104,7 +114,7 @@ class PeriodicInput:
             ShapeError: if the function does not return (k, n).
             NotFiniteError: if it is NaN or infinite somewhere.
         """
-        exact = _number(period, "period", {})
+        exact = period_of(period, {})
         length = float(exact)
         probe = np.asarray(function(np.linspace(0, length, 3, endpoint=False)), dtype=float)
         if probe.ndim != 2 or probe.shape[0] != 3:
@@ -145,12 +155,12 @@ class PeriodicInput:
             InputError: if the ends do not increase from 0, or a formula is not understood.
             ShapeError: if the pieces differ in the number of components.
         """
-        symbols = {name: _symbol(name) for name in parameters}
-        ends = [_number(end, "the end of a piece", {}) for end, _ in pieces]
+        symbols = {name: symbol_of(name) for name in parameters}
+        ends = [number_of(end, "the end of a piece", {}) for end, _ in pieces]
         moments = [float(end) for end in ends]
         if not ends or any(b <= a for a, b in zip([0.0, *moments], moments, strict=False)):
             raise InputError(f"PeriodicInput.from_pieces: the ends {moments} must increase from above 0")
-        formulas = [[_formula(entry, symbols) for entry in entries] for _, entries in pieces]
+        formulas = [[formula_of(entry, symbols) for entry in entries] for _, entries in pieces]
         if len({len(row) for row in formulas}) != 1:
             raise ShapeError("PeriodicInput.from_pieces: every piece must have the same number of components")
         inside = tuple(moments[:-1])
@@ -165,17 +175,7 @@ class PeriodicInput:
                     f"PeriodicInput.from_pieces: the parameters {', '.join(sorted(map(str, free)))} need pieces that are "
                     "polynomials in t with sines and cosines of commensurate rates"
                 ) from None
-        functions = [_compiled(row) for row in formulas]
-
-        def evaluate(t: Array) -> Array:
-            index = np.clip(np.searchsorted(moments, t, side="right"), 0, len(moments) - 1)
-            result = np.empty((len(t), len(formulas[0])))
-            for piece, function in enumerate(functions):
-                here = index == piece
-                result[here] = function(t[here])
-            return result
-
-        return PeriodicInput.from_callable(evaluate, ends[-1], breakpoints=inside)
+        return PeriodicInput.from_callable(pieces_function(moments, formulas), ends[-1], breakpoints=inside)
 
     @property
     def dim(self) -> int:
@@ -261,7 +261,7 @@ class PeriodicInput:
                 )
         if not values:
             return self
-        numbers = {_symbol(name): _binary(value) for name, value in values.items()}
+        numbers = {symbol_of(name): exact_value(value) for name, value in values.items()}
         left = tuple(name for name in self.parameters if name not in values)
         if not isinstance(self.waveform, TrigWaveform):
             raise InputError("PeriodicInput.at: put the numbers into the formulas of an input in pieces")
@@ -273,7 +273,7 @@ class PeriodicInput:
         Raises:
             ShapeError: if the matrix has not n columns.
         """
-        exact = sp.ImmutableMatrix([[_binary(value) for value in row] for row in _rows(matrix)])
+        exact = sp.ImmutableMatrix([[exact_value(value) for value in row] for row in rows_of(matrix)])
         if exact.cols != self.dim:
             raise ShapeError(
                 f"PeriodicInput.linear: the matrix has {exact.cols} columns, the input {self.dim} components"
@@ -303,109 +303,3 @@ class PeriodicInput:
         periodic = self.waveform.evaluator(calculus, wave, self.dim)
         drift, omega = self.mean, float(self.waveform.omega)
         return lambda t: periodic(t) / omega + t[..., None] * drift
-
-
-def _waveform(u: PeriodicInput) -> Waveform:
-    """The waveform of formulas."""
-    if not u.components:
-        raise InputError("PeriodicInput: no component; give one formula for each direction of the group")
-    symbols = {name: _symbol(name) for name in u.parameters}
-    formulas = tuple(_formula(entry, symbols) for entry in u.components)
-    period = None if u.period is None else _number(u.period, "period", symbols)
-    if period is not None and not period.free_symbols and not float(period) > 0:
-        raise PeriodError(f"PeriodicInput: the period {u.period} is not positive")
-    try:
-        form = trig_form(formulas, TIME, period, "PeriodicInput")
-        return TrigWaveform(form, tuple(symbols.values()))
-    except NotTrigonometricError as error:
-        return _sampled(u, formulas, period, str(error))
-
-
-def _sampled(u: PeriodicInput, formulas: tuple[sp.Expr, ...], period: sp.Expr | None, culprit: str) -> Waveform:
-    free = set().union(*(formula.free_symbols for formula in formulas)) - {TIME}
-    if free:
-        raise InputError(
-            f"PeriodicInput: {culprit} is not a sum of sines and cosines, so the input is taken by its values, and the "
-            f"parameters {', '.join(sorted(map(str, free)))} have none; put numbers in their place"
-        )
-    if period is None or period.free_symbols:
-        raise PeriodError(f"PeriodicInput: {culprit} is not a sum of sines and cosines; give its period")
-    length = float(period)
-    function = _compiled(formulas)
-    probe = length * np.array([0.0131, 0.271828, 0.577215, 0.8314159])
-    here, later = function(probe), function(probe + length)
-    off = np.max(np.abs(later - here), axis=0)
-    bad = np.flatnonzero(~(off <= _PERIODIC_TO * np.maximum(1.0, np.max(np.abs(here), axis=0))))
-    if len(bad):
-        raise PeriodError(
-            f"PeriodicInput: component {bad[0] + 1}, {u.components[bad[0]]}, is not periodic with period {period}: it "
-            f"changes by {off[bad[0]]:.3g} over one; pieces that start anew each period go to PeriodicInput.from_pieces"
-        )
-    panels, values = resolve(function, length, u.breakpoints)
-    return SampledWaveform(panels, values, function, period)
-
-
-def _compiled(formulas: Sequence[sp.Expr]) -> Callable[[Array], Array]:
-    """(k,) -> (k, n) from formulas of t alone."""
-    functions = [sp.lambdify(TIME, formula, "numpy", cse=True) for formula in formulas]
-
-    def evaluate(t: Array) -> Array:
-        times = np.asarray(t, dtype=float)
-        return np.stack([np.broadcast_to(np.asarray(f(times), dtype=float), times.shape) for f in functions], axis=-1)
-
-    return evaluate
-
-
-def _symbol(name: str) -> sp.Symbol:
-    if not isinstance(name, str) or not name.isidentifier() or name in ("t", "pi"):
-        raise InputError(f"PeriodicInput: {name!r} cannot name a parameter")
-    return sp.Symbol(name, real=True)
-
-
-def _formula(entry: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
-    if isinstance(entry, str):
-        return parse_expression(entry, {"t": TIME, "pi": sp.pi, **symbols}, FORMULA_FUNCTIONS)
-    if isinstance(entry, sp.Expr):
-        known = {"t": TIME, **symbols}
-        for symbol in entry.free_symbols:
-            if str(symbol) not in known:
-                raise InputError(f"PeriodicInput: {symbol} in {entry} is not declared; name it in `parameters`")
-        floats = {number: _binary(float(number)) for number in entry.atoms(sp.Float)}
-        return entry.xreplace({**floats, **{symbol: known[str(symbol)] for symbol in entry.free_symbols}})
-    return _binary(entry)
-
-
-def period_of(value: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """A period given as text, number or SymPy expression in the given symbols.
-
-    Raises:
-        InputError: if it is not understood or depends on t.
-    """
-    return _number(value, "period", symbols)
-
-
-def _number(value: Any, what: str, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
-    result = _formula(value, symbols)
-    if result.has(TIME):
-        raise InputError(f"PeriodicInput: {what} {value!r} depends on t")
-    return result
-
-
-def _binary(value: Any) -> sp.Expr:
-    """A number exactly; a float at its binary value."""
-    if isinstance(value, float | np.floating):
-        if not np.isfinite(value):
-            raise NotFiniteError(f"PeriodicInput: {value} is not finite")
-        return sp.Rational(*float(value).as_integer_ratio())
-    return exact_number(value)
-
-
-def _coefficients(table: Any, what: str) -> list[list[sp.Expr]]:
-    try:
-        return [[_binary(value) for value in row] for row in _rows(table)]
-    except TypeError:
-        raise ShapeError(f"PeriodicInput.from_fourier: {what} must be rows of n coefficients") from None
-
-
-def _rows(table: Any) -> list[list[Any]]:
-    return table.tolist() if isinstance(table, np.ndarray | sp.MatrixBase) else [list(row) for row in table]

@@ -104,24 +104,24 @@ def _draw(theta_dot: PeriodicInput, u: PeriodicInput, averaged: Any, flow: Any, 
 
 def _sketch(axes: Any) -> None:
     """The body as a box, the wheels as discs on their axes."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-
     half = np.array([0.55, 0.5, 0.42])
+    square = np.array([[-1.0, 1.0], [-1.0, 1.0]])
     for k in range(3):
         for sign in (-1, 1):
-            corners = []
-            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-                point = np.empty(3)
-                point[k], point[(k + 1) % 3], point[(k + 2) % 3] = sign, a, b
-                corners.append(point * half)
-            axes.add_collection3d(Poly3DCollection([corners], facecolor=SAND, edgecolor=GREY, alpha=0.35, lw=0.8))
-    turn = np.linspace(0, 2 * np.pi, 60)
+            face = np.empty((3, 2, 2))
+            face[k], face[(k + 1) % 3], face[(k + 2) % 3] = sign, square, square.T
+            axes.plot_surface(
+                *(face * half[:, None, None]), color=SAND, edgecolor=GREY, alpha=0.35, lw=0.8, shade=False
+            )
+    radius, turn = np.meshgrid([0.0, 0.22], np.linspace(0, 2 * np.pi, 60))
     for i, colour in enumerate((BLUE, RED, GREEN)):
         spin = np.array(_WHEELS.axes.row(i), dtype=float).ravel()
-        c = np.linalg.svd(spin[None])[2][1:]
-        centre = 0.95 * spin
-        rim = centre + 0.22 * (np.outer(np.cos(turn), c[0]) + np.outer(np.sin(turn), c[1]))
-        axes.add_collection3d(Poly3DCollection([rim], facecolor=colour, edgecolor=colour, alpha=0.45))
+        first, second = np.linalg.svd(spin[None])[2][1:]
+        disc = [
+            0.95 * s + radius * (np.cos(turn) * f + np.sin(turn) * g)
+            for s, f, g in zip(spin, first, second, strict=True)
+        ]
+        axes.plot_surface(*disc, color=colour, alpha=0.5, lw=0, shade=False)
         axes.plot(*np.array([np.zeros(3), 1.35 * spin]).T, color=colour, lw=1.2)
         axes.text(*(1.48 * spin), f"$b_{i + 1}$", color=colour)
     for i in range(3):
@@ -130,5 +130,7 @@ def _sketch(axes: Any) -> None:
         axes.text(*(0.86 * e), f"$r_{i + 1}$", color="0.35", fontsize=8)
     axes.set(xlim=(-0.8, 1.2), ylim=(-0.8, 1.2), zlim=(-0.8, 1.2))
     axes.view_init(22, 38)
-    axes.set_title("three skew wheels at $b_i$; body axes $r_i$", y=1.1)
+    axes.text2D(
+        0.5, -0.02, "three skew wheels at $b_i$; body axes $r_i$", transform=axes.transAxes, ha="center", fontsize=12
+    )
     bare(axes)

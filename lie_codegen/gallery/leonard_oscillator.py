@@ -128,5 +128,7 @@ def _sketch(axes: Any, x_dot: PeriodicInput) -> None:
         axes.text(*(1.33 * e), f"$r_{i + 1}$", color="0.35", fontsize=8)
     axes.set(xlim=(-0.9, 1.1), ylim=(-0.9, 1.1), zlim=(-0.9, 1.1))
     axes.view_init(48, 15)
-    axes.set_title("a point mass $m_1$ driven inside the body")
+    axes.text2D(
+        0.5, -0.02, "a point mass $m_1$ driven inside the body", transform=axes.transAxes, ha="center", fontsize=12
+    )
     bare(axes)

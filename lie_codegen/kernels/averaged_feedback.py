@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.algebra.exact import exact_number
 from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
-from lie_codegen.averaging.periodic_input import TIME, period_of
+from lie_codegen.averaging.input_formulas import TIME, period_of
 from lie_codegen.averaging.signal_values import expressions_of
 from lie_codegen.averaging.trig_formula import NotTrigonometricError, trig_form
 from lie_codegen.averaging.trig_signal import TrigCalculus

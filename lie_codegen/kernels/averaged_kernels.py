@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 
 from lie_codegen.averaging.averaged import Averaged
-from lie_codegen.averaging.periodic_input import TIME
+from lie_codegen.averaging.input_formulas import TIME
 from lie_codegen.errors import InputError
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.complex_scalar import Complex
