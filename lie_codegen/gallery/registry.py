@@ -47,6 +47,15 @@ TARGETS = (
     ),
     Target("tracking_planar_flows", "tracking_planar_flows", "Bullo and Murray, Figure 5: gradient flows on SE(2)"),
     Target("tracking_rows", "tracking_rows", "Bullo and Murray, Table 1: six error functions, one vehicle"),
+    Target("rigid_body_boom", "rigid_body_boom", "Coppola, Figure 1: boom deployment, actual, averaged and algebraic"),
+    Target("rigid_body_thruster", "rigid_body_thruster", "Coppola, Figure 2: a thruster on a tumbling body"),
+    Target("rigid_body_limit_cycle", "rigid_body_limit_cycle", "Coppola, Figure 3: limit cycle by linear feedback"),
+    Target("rigid_body_cost", "rigid_body_cost", "cost and error of averaging over 1/eps; elliptic kernels and SciPy"),
+    Target("vibrational_kapitza", "vibrational_kapitza", "Kapitza's pendulum: average, threshold, a tilt held in C"),
+    Target("vibrational_examples", "vibrational_examples", "cart and two-link arm, actual against averaged, orders"),
+    Target(
+        "vibrational_dumbbell", "vibrational_dumbbell", "Sanyal, Figure 3: what reproduces, and the corrected design"
+    ),
 )
 
 

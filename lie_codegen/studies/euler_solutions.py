@@ -144,7 +144,7 @@ def explicit_inertia_change(body: PrincipalBody, L: float, k0: float, tau: Array
         InputError: r0^2 gamma_12 reaches 1, where the model has no motion.
     """
     slow = np.asarray(tau, dtype=np.float64)
-    value = _function_of_tau(slow)
+    value = function_of_tau(slow)
     ratios = [value(body.small_gamma(*pair)) for pair in ((1, 2), (3, 1), (3, 2))]
     first, second, third = ratios
     g12, g31, g32 = (float(body.small_gamma(*pair).subs(TAU, 0)) for pair in ((1, 2), (3, 1), (3, 2)))
@@ -162,7 +162,8 @@ def explicit_inertia_change(body: PrincipalBody, L: float, k0: float, tau: Array
     )
 
 
-def _function_of_tau(tau: Array) -> Callable[[sp.Expr], Array]:
+def function_of_tau(tau: Array) -> Callable[[sp.Expr], Array]:
+    """The values (N,) of expressions in tau at slow times tau (N,)."""
     evaluate = ExpressionEvaluator(NumpyArithmetic(), {TAU: tau})
     return lambda expression: np.broadcast_to(np.asarray(evaluate(expression), dtype=np.float64), tau.shape)
 

@@ -1,0 +1,194 @@
+"""The dumbbell in orbit: what of Figure 3 of Sanyal, Bloch and McClamroch reproduces, and the corrected design.
+
+Reproduces: the averaged system (19) with the printed T^j and gains converges slowly; without amplitude feedback (PD and
+sin alone) the actual motion looks like the figure. Does not: the actual system with the printed amplitude feedback,
+whose input (36) has the mean alpha omega, hence a positive rate feedback k2 = -2.1, diverges within one time unit. The
+PD term alone already stabilises the equilibrium, and the printed feedback adds nothing to the orbit mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.averaging.vibrational import vibrational_fields
+from lie_codegen.control.relative_equilibria import relative_equilibrium
+from lie_codegen.control.vibrational_feedback import VibrationalFeedback, design_feedback
+from lie_codegen.gallery.result import GalleryResult, new_figure, save
+from lie_codegen.kernels.expressions import expression_body
+from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernels.vibrational_law import closed_loop_start, feedback_kernels
+from lie_codegen.mechanics.lagrangian import lagrangian_system
+from lie_codegen.mechanics.routh import RouthReduction, routh_reduce
+from lie_codegen.mechanics.vector_fields import lie_bracket, symmetric_product
+from lie_codegen.runtime.front import build
+from lie_codegen.studies.broadcast import Array
+from lie_codegen.studies.vibrational import integrate, vibrational_average
+
+_P, _RATIO, _OMEGA, _K1, _K2 = 2.00102, 0.05, 50.0, 0.7, -2.1
+_START = (1.00027, 1.6008, 0.001555, 0.0)
+_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
+
+
+def dumbbell(ratio: float) -> RouthReduction:
+    """The dumbbell of (25) in scaled variables with the PD term of (35), the orbit angle eliminated.
+
+    u enters theta'' as (1 + eps^2 / rho^2) u: it is Nbar / eps of (30).
+    """
+    full = lagrangian_system(
+        coordinates=("rho", "th", "nu"),
+        lagrangian="drho^2 + rho^2*dnu^2 + e^2*(dth + dnu)^2 + (2 - e^2/rho^2*(1 - 3*cos(th)^2))/rho",
+        forces={"th": "2*e^2*(u - 10*((th - pi/2) + dth))"},
+        parameters={"e": ratio},
+    )
+    return routh_reduce(full, momentum={"nu": "p"})
+
+
+def vibrational_dumbbell(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
+    """Four panels: averaged as printed, actual as printed, actual without amplitude feedback, corrected design."""
+    reduced = dumbbell(_RATIO)
+    alone = relative_equilibrium(reduced, [1.0, np.pi / 2], {"p": _P})
+    progress("the averaged system (19), as printed")
+    t = np.linspace(0, 180 * np.pi, 3170)
+    averaged = integrate(printed_average(reduced), _START, t, 1e-9)
+    progress("the actual system with the printed amplitude feedback")
+    escape, actual = printed_actual(reduced)
+    progress("the actual system with PD and sin alone, 4500 periods")
+    calm = vibrational_average(reduced, PeriodicInput(["20*sin(t)"], period="2*pi"), order=1)
+    free = calm.solve_actual(_START, t, 1 / _OMEGA, {"p": _P}, rtol=1e-8)
+    progress("the corrected design at l/R = 0.3")
+    corrected = corrected_design()
+    design = corrected.design
+    numbers = {
+        "pd_alone_eigenvalues": [[float(x.real), float(x.imag)] for x in alone.eigenvalues],
+        "averaged_as_printed": {
+            "rho_amplitude_first_tenth": _amplitude(averaged[:300, 0]),
+            "rho_amplitude_last_tenth": _amplitude(averaged[-300:, 0]),
+            "theta_amplitude": _amplitude(averaged[:, 1]),
+        },
+        "actual_as_printed_escapes_at": escape,
+        "pd_and_sin_alone": {
+            "rho_amplitude_first_tenth": _amplitude(free[:300, 0]),
+            "rho_amplitude_last_tenth": _amplitude(free[-300:, 0]),
+            "theta_amplitude_last_tenth": _amplitude(free[-300:, 1]),
+        },
+        "corrected_design": {
+            "ratio": 0.3,
+            "orbit_damping_without": float(np.min(-design.open_loop.real)),
+            "orbit_damping_with": float(np.min(-design.closed_loop.real)),
+            "rho_amplitude_last_orbit_without": _amplitude(corrected.without[-100:, 0]),
+            "rho_amplitude_last_orbit_with": _amplitude(corrected.run[-100:, 0]),
+        },
+    }
+    figure = new_figure(12, 8)
+    axes: Any = figure.subplots(2, 2)
+    figure.suptitle("Dumbbell in orbit (Sanyal, Bloch and McClamroch, Figure 3): what reproduces", fontsize=13)
+    orbits = t / (2 * np.pi)
+    axes[0, 0].plot(orbits, averaged[:, 0], color=_BLUE, lw=0.7)
+    axes[0, 0].set(title="reproduces: averaged (19), printed $T^j$ and gains", xlabel="orbits", ylabel="$\\rho$")
+    axes[0, 1].plot(actual[:, 0], actual[:, 2] - np.pi / 2, color=_RED)
+    axes[0, 1].set(
+        title=f"does not: actual with (36), (37) escapes at {escape:.2f}",
+        xlabel="orbital time",
+        ylabel="$\\theta-\\pi/2$",
+    )
+    axes[1, 0].plot(orbits, free[:, 0], color=_GREY, lw=0.7)
+    axes[1, 0].set(title="looks like the figure: actual, PD and sin, no feedback", xlabel="orbits", ylabel="$\\rho$")
+    axes[1, 1].plot(corrected.t / (2 * np.pi), corrected.without[:, 0], color=_GREY, lw=0.9, label="PD and vibration")
+    axes[1, 1].plot(
+        corrected.t / (2 * np.pi), corrected.run[:, 0], color=_BLUE, lw=1.1, label="amplitude feedback, in C"
+    )
+    axes[1, 1].set(title="corrected design, LQR, $l/R = 0.3$, actual motion", xlabel="orbits", ylabel="$\\rho$")
+    axes[1, 1].legend(frameon=False, loc="lower right")
+    return save("vibrational_dumbbell", folder, figure, numbers)
+
+
+def printed_average(reduced: RouthReduction) -> Callable[[float, Any], Any]:
+    """z' of (19) with the printed coefficients of Figure 2 and alpha = -k1 (theta - pi/2) - k2 theta'."""
+    system = reduced.system
+    state, drift, lift = system.state, system.drift, system.input_fields[0]
+    alpha = -sp.Float(_K1) * (state[1] - sp.pi / 2) - sp.Float(_K2) * state[3]
+    w, pi, e = sp.Float(_OMEGA), sp.pi, sp.Float(_RATIO)
+    second = sp.Rational(3, 2) + 2 * pi * alpha + 5 * alpha**2 / 8 + 4 * pi**2 * alpha**2 / 3
+    # (1/eps) T^j of the paper's Figure 2; T^3 is a misprint there and is kept as printed
+    coefficients = (
+        1 + pi * alpha,
+        -second / 2,
+        e * (sp.Rational(3, 4) + pi * alpha + 5 * alpha**2 / 16 + 2 * pi**2 * alpha**2 / 3 - pi * (1 + pi * alpha) / w),
+        -e
+        / 2
+        * ((100 * alpha + pi * (36 + alpha * (3 * alpha + 16 * pi * (2 + pi * alpha)))) / (24 * w) - pi / w * second),
+    )
+    bracket, product = lie_bracket(lift, drift, state), symmetric_product(lift, lift, drift, state)
+    fields = (bracket, product, lie_bracket(bracket, drift, state), lie_bracket(product, drift, state))
+    total = sum((c * f for c, f in zip(coefficients, fields, strict=True)), drift)
+    (p,) = system.parameter_symbols
+    body = expression_body([state], [list(total.xreplace({p: sp.Float(_P)}))])
+    kernel = Kernel("printed", "dumbbell", (Port("z", (4,)),), (Port("z_dot", (4,)),), body)
+    rate = build(kernel)["printed"]
+    return lambda time, z: rate(z)
+
+
+def printed_actual(reduced: RouthReduction) -> tuple[float, Array]:
+    """The time at which |theta - pi/2| passes pi, and (N, 5) samples (t, y): Nbar / eps = Nbar_f + (36) / eps."""
+    system = reduced.system
+    y = system.state
+    t, (p,) = sp.Symbol("t", real=True), system.parameter_symbols
+    alpha = -sp.Float(_K1) * (y[1] - sp.pi / 2) - sp.Float(_K2) * y[3]
+    w = sp.Float(_OMEGA)
+    force = (alpha * w * (1 - sp.cos(2 * w * t)) + w * sp.sin(w * t)) / sp.Float(_RATIO)
+    total = (system.drift + force * system.input_fields[0]).xreplace({p: sp.Float(_P)})
+    body = expression_body([y, t], [list(total)])
+    kernel = Kernel("printed_actual", "dumbbell", (Port("y", (4,)), Port("t", ())), (Port("y_dot", (4,)),), body)
+    rate = build(kernel)["printed_actual"]
+    now, state, step, rows = 0.0, np.array(_START), 2 * np.pi / _OMEGA / 400, []
+    while now < 5:
+        rows.append([now, *state])
+        if abs(state[1] - np.pi / 2) > np.pi:
+            break
+        k1 = rate(state, now)
+        k2 = rate(state + step / 2 * k1, now + step / 2)
+        k3 = rate(state + step / 2 * k2, now + step / 2)
+        state = state + step / 6 * (k1 + 2 * k2 + 2 * k3 + rate(state + step * k3, now + step))
+        now += step
+    return now, np.array(rows)
+
+
+@dataclass(frozen=True)
+class CorrectedRun:
+    """The corrected design and actual motions with and without it, sampled once a period."""
+
+    design: VibrationalFeedback
+    t: Array
+    run: Array
+    without: Array
+
+
+def corrected_design(eps: float = 0.01, orbits: int = 12) -> CorrectedRun:
+    """LQR on the averaged system with input (5.5 + alpha) sin, zero mean, held over a period; l/R = 0.3."""
+    reduced = dumbbell(0.3)
+    momentum = 2 * (1 + 0.09) * np.sqrt(1 - 1.5 * 0.09)
+    u = PeriodicInput(["(11/2 + alpha)*sin(t)"], period="2*pi", parameters=("alpha",))
+    design = design_feedback(
+        vibrational_fields(reduced, u), amplitudes=["alpha"], eps=eps, guess=[1.1, np.pi / 2, 0.0, 0.0],
+        weights=(np.eye(4), 0.01 * np.eye(1)), parameters={"p": momentum}, limit=5.0,
+    )  # fmt: skip
+    steps, periods = 40, round(orbits / eps)
+    library = build(feedback_kernels(design, "dumbbell", steps=steps))
+    start = closed_loop_start(design, design.equilibrium + np.array([0.05, 0.0, 0.0, 0.0]))
+    loop = library["loop"].scan(start, n=steps * periods, every=steps)
+    t: Array = np.linspace(0, 2 * np.pi * eps * periods, periods + 1)
+    still = replace(design, K=0 * design.K)
+    silent = build(feedback_kernels(still, "dumbbell_free", steps=steps))
+    rest = silent["loop"].scan(start, n=steps * periods, every=steps)
+    return CorrectedRun(design, t, loop, rest)
+
+
+def _amplitude(values: Array) -> float:
+    return float((values.max() - values.min()) / 2)
