@@ -66,6 +66,7 @@ def test_every_group_has_the_kernels_of_the_front_door(name: str) -> None:
             assert port.is_complex == (matrix and group.is_complex)
         assert k.namespace == group.name
         assert k.formula
+        assert k.source
 
 
 def test_an_unknown_kernel_is_refused() -> None:

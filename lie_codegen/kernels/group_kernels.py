@@ -91,7 +91,7 @@ def _exp(data: GroupDerivation) -> Kernel:
         return (exp_matrix(ops, data, x),)
 
     return _kernel(
-        data, "exp", [_vector(data, "x")], [_matrix(data, "X")], body, "X = exp(x_1 A_1 + ... + x_n A_n)", ""
+        data, "exp", [_vector(data, "x")], [_matrix(data, "X")], body, "X = exp(x_1 A_1 + ... + x_n A_n)", _EXP
     )
 
 
