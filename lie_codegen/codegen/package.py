@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from lie_codegen.codegen.lanes import lane_body, lanes_header
 from lie_codegen.codegen.opcodes import c_literal
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.tape import tape_of
@@ -32,12 +33,14 @@ class LibrarySources:
         main: the file to hand to the compiler.
         statements: number of statements, by which the runtime chooses the optimisation level.
         signatures: one a kernel.
+        notes: what the build log says about them.
     """
 
     files: Mapping[str, str]
     main: str
     statements: int
     signatures: tuple[Signature, ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,23 +94,38 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     Raises:
         CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
     """
-    view = _view(namespace, kernels, PackageMetadata())
+    _check(namespace, kernels)
+    tapes = [tape_of(kernel) for kernel in kernels]
+    view = package_view(namespace, kernels, tapes, PackageMetadata())
+    bodies = [lane_body(tape) for tape in tapes]
     files = {
         f"{namespace}.h": render("header.h.jinja", package=view),
         f"{namespace}.c": render("source.c.jinja", package=view),
-        f"{namespace}_binding.c": render("binding.c.jinja", package=view),
+        "lie_codegen_lanes.h": lanes_header(),
+        f"{namespace}_binding.c": render(
+            "binding.c.jinja", package=view, kernels=list(zip(view.kernels, bodies, strict=True))
+        ),
     }
     return LibrarySources(
         files=files,
         main=f"{namespace}_binding.c",
         statements=sum(len(kernel.statements) for kernel in view.kernels),
         signatures=tuple(Signature.of(kernel) for kernel in kernels),
+        notes=tuple(
+            f"{kernel.name}: batches call libm lane by lane for {', '.join(body.slow)}"
+            for kernel, body in zip(kernels, bodies, strict=True)
+            if body.slow
+        ),
     )
 
 
-def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata) -> PackageView:
+def _check(namespace: str, kernels: Sequence[Kernel]) -> None:
     check_identifier(namespace, "namespace")
     _check_symbols(namespace, kernels)
+
+
+def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata) -> PackageView:
+    _check(namespace, kernels)
     tapes = [tape_of(kernel) for kernel in kernels]
     return package_view(namespace, kernels, tapes, metadata)
 
@@ -120,7 +138,9 @@ def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
     for kernel in kernels:
         if kernel.namespace != namespace:
             raise CodegenError(f"kernel {kernel.symbol} is not of the namespace {namespace}: rename one of them")
-        suffixes = ("", "_call", "_batch") + (("_scan",) if is_step(kernel.inputs, kernel.outputs) else ())
+        suffixes = ("", "_call", "_batch", "_lanes") + (
+            ("_scan", "_scan_batch") if is_step(kernel.inputs, kernel.outputs) else ()
+        )
         for suffix in suffixes:
             symbol = kernel.symbol + suffix
             if symbol in owner:

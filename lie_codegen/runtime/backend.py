@@ -33,6 +33,17 @@ class Backend(Protocol):
     ) -> None:
         """state <- f(state, ...) `count` times, from inputs[0]; stores the start and every `every`-th state."""
 
+    def scan_batch(
+        self,
+        count: int,
+        steps: int,
+        every: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        trajectories: np.ndarray[Any, Any],
+    ) -> None:
+        """`count` such loops; strides in doubles from one trajectory to the next and from one step to the next."""
+
 
 class _Workspace:
     """Buffers of one call, with their addresses; asking numpy for an address costs more than a kernel."""
@@ -54,11 +65,10 @@ class CtypesBackend:
         self._idle: list[_Workspace] = []  # pop and append are atomic: no two calls ever share a workspace
         self._call = _function(library, f"{symbol}_call", void, void)
         self._batch = _function(library, f"{symbol}_batch", size, void, void, void)
-        self._scan = (
-            _function(library, f"{symbol}_scan", size, size, void, void, void)
-            if is_step(signature.inputs, signature.outputs)
-            else None
-        )
+        self._scan = self._scan_batch = None
+        if is_step(signature.inputs, signature.outputs):
+            self._scan = _function(library, f"{symbol}_scan", size, size, void, void, void)
+            self._scan_batch = _function(library, f"{symbol}_scan_batch", size, size, size, void, void, void, void)
 
     def call(self, inputs: Arrays, outputs: Arrays) -> None:
         try:
@@ -81,6 +91,20 @@ class CtypesBackend:
         if self._scan is None:
             raise CacheError("the library has no loop for this kernel")
         self._scan(count, every, _pointers(inputs), _strides(strides), trajectory.ctypes.data)
+
+    def scan_batch(
+        self,
+        count: int,
+        steps: int,
+        every: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        trajectories: np.ndarray[Any, Any],
+    ) -> None:
+        if self._scan_batch is None:
+            raise CacheError("the library has no loop for this kernel")
+        lanes, moves = (_strides([pair[side] for pair in strides]) for side in (0, 1))
+        self._scan_batch(count, steps, every, _pointers(inputs), lanes, moves, trajectories.ctypes.data)
 
 
 class InterpretedBackend:
@@ -122,6 +146,21 @@ class InterpretedBackend:
             state = np.array(self._function.call([state, *rest])[0].nonzeros())
             if (k + 1) % every == 0:
                 stored[(k + 1) // every] = state
+
+    def scan_batch(
+        self,
+        count: int,
+        steps: int,
+        every: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        trajectories: np.ndarray[Any, Any],
+    ) -> None:
+        rows = [_flat(array) for array in inputs]
+        for j in range(count):
+            mine = [row[j * lane :] for row, (lane, _) in zip(rows, strides, strict=True)]
+            mine[0] = mine[0][: self._function.numel_in(0)]
+            self.scan(steps, every, mine, [step for _, step in strides], trajectories[j])
 
 
 def load_library(path: Path) -> ctypes.CDLL:

@@ -162,7 +162,7 @@ def _fill(
             (home / name).write_bytes(text.encode())
         output = f"{namespace}{_SUFFIX}"
         compile_library(compiler, home, sources.main, output, flags)
-        return cache.store_entry(folder, key, home / output, namespace, sources.signatures)
+        return cache.store_entry(folder, key, home / output, namespace, sources.signatures, sources.notes)
 
 
 def _open_or_none(entry: cache.Entry) -> Library | None:
@@ -179,4 +179,7 @@ def _open(entry: cache.Entry) -> Library:
         quick(Compiled(signature, CtypesBackend(shared, signature), compiled=True), shared, signature)
         for signature in entry.signatures
     ]
-    return Library(entry.namespace, functions, entry.library)
+    lanes = int(shared[f"{entry.namespace}_lie_codegen_lanes"]())
+    how = "the extension type" if functions and not isinstance(functions[0], Compiled) else "ctypes"
+    log = (f"batches: {lanes} samples at a time", f"calls: through {how}", *entry.notes)
+    return Library(entry.namespace, functions, entry.library, log)

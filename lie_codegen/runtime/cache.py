@@ -34,6 +34,7 @@ class Entry:
     namespace: str
     library: Path
     signatures: tuple[Signature, ...]
+    notes: tuple[str, ...] = ()
 
 
 def find_request(folder: Path, request: str) -> Entry | None:
@@ -50,16 +51,24 @@ def find_entry(folder: Path, key: str) -> Entry | None:
     try:
         namespace, name, expected = str(data["namespace"]), str(data["file"]), str(data["sha256"])
         signatures = tuple(Signature.from_json(each) for each in data["signatures"])
+        notes = tuple(str(note) for note in data["notes"])
         if "/" in name or "\\" in name or _file_digest(home / name) != expected:
             return None
     except (OSError, ValueError, TypeError, LookupError):
         return None
     with contextlib.suppress(OSError):
         os.utime(home / "entry.json")  # the time of last use, for eviction
-    return Entry(namespace, home / name, signatures)
+    return Entry(namespace, home / name, signatures, notes)
 
 
-def store_entry(folder: Path, key: str, built: Path, namespace: str, signatures: Sequence[Signature]) -> Entry:
+def store_entry(
+    folder: Path,
+    key: str,
+    built: Path,
+    namespace: str,
+    signatures: Sequence[Signature],
+    notes: Sequence[str] = (),
+) -> Entry:
     """Move a library just built (on the same disk) into the cache.
 
     Raises:
@@ -76,9 +85,10 @@ def store_entry(folder: Path, key: str, built: Path, namespace: str, signatures:
         "file": library.name,
         "sha256": content,
         "signatures": [each.to_json() for each in signatures],
+        "notes": list(notes),
     }
     write_json(home / "entry.json", data)
-    return Entry(namespace, library, tuple(signatures))
+    return Entry(namespace, library, tuple(signatures), tuple(notes))
 
 
 def store_request(folder: Path, request: str, key: str) -> None:

@@ -18,18 +18,23 @@ class Library:
         kernels: names, in order.
         compiled: False where CasADi's interpreter stands in for C.
         path: the shared library, or None.
+        build_log: how it was built: lanes of a batch, operations without a lane form, how calls go.
     """
 
     namespace: str
     kernels: tuple[str, ...]
     compiled: bool
     path: Path | None
+    build_log: tuple[str, ...]
 
-    def __init__(self, namespace: str, functions: Sequence[Compiled], path: Path | None) -> None:
+    def __init__(
+        self, namespace: str, functions: Sequence[Compiled], path: Path | None, build_log: Sequence[str] = ()
+    ) -> None:
         self.namespace = namespace
         self.kernels = tuple(function.name for function in functions)
         self.compiled = path is not None
         self.path = path
+        self.build_log = tuple(build_log)
         self._functions = {function.name: function for function in functions}
         self.__dict__.update(self._functions)
 

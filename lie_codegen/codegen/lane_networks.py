@@ -1,0 +1,129 @@
+"""Networks of two-source shuffles that turn records of doubles into lanes and back.
+
+A record of s doubles a sample lies in memory one after another; a lane vector holds one entry of L samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mix:
+    """name = the elements `picks` of the 2 L elements of first and second."""
+
+    name: str
+    first: str
+    second: str
+    picks: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Network:
+    """Steps in order, and the names of the results."""
+
+    size: int
+    steps: tuple[Mix, ...]
+    results: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class LaneNetworks:
+    """All that one number of lanes needs: records smaller than it, and the square transposition."""
+
+    lanes: int
+    loads: tuple[Network, ...]
+    stores: tuple[Network, ...]
+    square: Network
+
+
+def networks(lanes: int) -> LaneNetworks:
+    """The networks for that many lanes, a power of two."""
+    sizes = range(1, lanes)
+    return LaneNetworks(
+        lanes=lanes,
+        loads=tuple(_Maker(lanes).network(size, load=True) for size in sizes),
+        stores=tuple(_Maker(lanes).network(size, load=False) for size in sizes),
+        square=_Maker(lanes).square(),
+    )
+
+
+class _Maker:
+    """Collects the steps of one network."""
+
+    def __init__(self, lanes: int) -> None:
+        self._lanes = lanes
+        self._steps: list[Mix] = []
+
+    def network(self, size: int, *, load: bool) -> Network:
+        names = [f"a{k}" for k in range(size)]
+        results = self._apart(names) if load else self._together(names)
+        return Network(size, tuple(self._steps), tuple(results))
+
+    def square(self) -> Network:
+        """Swaps bit after bit of the row index with that of the column index."""
+        names = [f"a{k}" for k in range(self._lanes)]
+        bit = 1
+        while bit < self._lanes:
+            for row in range(self._lanes):
+                if not row & bit:
+                    pair = (names[row], names[row | bit])
+                    low = [p if not p & bit else self._lanes + (p ^ bit) for p in range(self._lanes)]
+                    high = [p | bit if not p & bit else self._lanes + p for p in range(self._lanes)]
+                    names[row], names[row | bit] = self._mix(*pair, low), self._mix(*pair, high)
+            bit *= 2
+        return Network(self._lanes, tuple(self._steps), tuple(names))
+
+    def _mix(self, first: str, second: str, picks: Sequence[int]) -> str:
+        name = f"b{len(self._steps)}"
+        self._steps.append(Mix(name, first, second, tuple(picks)))
+        return name
+
+    def _apart(self, flat: list[str]) -> list[str]:
+        """Vectors of consecutive records -> one vector an entry; even and odd entries first where that halves."""
+        size, lanes = len(flat), self._lanes
+        if size == 1:
+            return flat
+        if size % 2 == 0:
+            pairs = list(zip(flat[::2], flat[1::2], strict=True))
+            halves = [self._apart([self._mix(a, b, range(k, 2 * lanes, 2)) for a, b in pairs]) for k in (0, 1)]
+            return [name for pair in zip(*halves, strict=True) for name in pair]
+        return [
+            self._collect(flat, [divmod(entry + size * lane, lanes) for lane in range(lanes)]) for entry in range(size)
+        ]
+
+    def _together(self, entries: list[str]) -> list[str]:
+        """The inverse of `_apart`."""
+        size, lanes = len(entries), self._lanes
+        if size == 1:
+            return entries
+        if size % 2 == 0:
+            evens, odds = self._together(entries[::2]), self._together(entries[1::2])
+            zipped = [lane // 2 + lanes * (lane % 2) for lane in range(2 * lanes)]
+            return [
+                self._mix(even, odd, zipped[half * lanes : (half + 1) * lanes])
+                for even, odd in zip(evens, odds, strict=True)
+                for half in (0, 1)
+            ]
+        return [
+            self._collect(entries, [divmod(vector * lanes + lane, size)[::-1] for lane in range(lanes)])
+            for vector in range(size)
+        ]
+
+    def _collect(self, sources: Sequence[str], wanted: Sequence[tuple[int, int]]) -> str:
+        """The vector whose lane k is element wanted[k][1] of source wanted[k][0]."""
+        lanes = self._lanes
+        used = sorted({source for source, _ in wanted})
+        first, *others = used
+        name, done = sources[first], {first}
+        picks = [place if source == first else 0 for source, place in wanted]
+        for other in others:
+            merged = [
+                lanes + place if source == other else (picks[lane] if source in done else 0)
+                for lane, (source, place) in enumerate(wanted)
+            ]
+            name = self._mix(name, sources[other], merged)
+            done.add(other)
+            picks = list(range(lanes))
+        return name
