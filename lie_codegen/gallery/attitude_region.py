@@ -15,7 +15,7 @@ from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.kernels.attitude_kernels import attitude_law
 from lie_codegen.kernels.group_kernels import group_kernel
-from lie_codegen.kernels.second_order_step import law_force, second_order_step
+from lie_codegen.kernels.second_order_step import second_order_step
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.simulation.second_order import initial_states, split_states
 
@@ -45,7 +45,7 @@ def monte_carlo(k_d: float, horizon: float, seed: int, samples: int = _SAMPLES) 
     so3 = group("so3")
     law = attitude_law("pd", inertia=_INERTIA, k_p=_K_P, k_d=k_d)
     logarithm = attitude_law("p", k_p=1)
-    kernels = [second_order_step(so3, _INERTIA, law_force(law, None)), law, logarithm, group_kernel(so3, "exp")]
+    kernels = [second_order_step(so3, _INERTIA, law=law), law, logarithm, group_kernel(so3, "exp")]
     lib = build_kernels(lambda: kernels, namespace="so3")
     rng = np.random.default_rng(seed)
     angle, speed = rng.uniform(0, np.pi, samples), rng.uniform(0, 2 * np.pi, samples)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.control.reference import TIME, FormulaReference, Reference, WaypointReference
+from lie_codegen.control.reference import TIME, FormulaReference, Reference, WaypointReference, formula_reference
 from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic, FloatArithmetic, Scalar
@@ -134,27 +134,38 @@ def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLik
     speed = np.zeros((len(t), group.dim))
     weight = spans[1:] / (spans[1:] + spans[:-1])
     speed[1:-1] = weight[:, None] * mean[:-1] + (1 - weight)[:, None] * mean[1:]
-    table = [_quintic(group, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
+    derivation = GroupDerivation(group)
+    table = [_quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
     return WaypointReference(group, t, X, np.array(table))
 
 
-def check_reference(reference: Reference, t0: float, t1: float, samples: int = 400) -> None:
+def check_reference(
+    reference: Reference, t0: float, t1: float, evaluate: Callable[[float], Any] | None = None, samples: int = 400
+) -> None:
     """Refuses a reference that jumps, or whose velocity or acceleration does, between t0 and t1.
+
+    Args:
+        reference: what to check.
+        t0: first time.
+        t1: last time.
+        evaluate: t -> (X_d, xi_d, xi_d_dot), as the compiled `reference_kernel` gives it; in Python floats if None.
+        samples: number of intervals of the first look.
 
     Raises:
         InputError: it jumps or is not finite; names the time.
     """
-    body, ops = ReferenceBody(reference), FloatArithmetic()
+    body = ReferenceBody(reference)
+    at = evaluate or (lambda t: body(FloatArithmetic(), t))
     name = reference.group.name
 
     def value(t: float) -> NDArray[Any]:
         try:
-            X, xi, rate = body(ops, t)
+            X, xi, rate = at(t)
         except InputError:
             raise
         except (ValueError, ZeroDivisionError, OverflowError):
             raise InputError(f"the reference on {name} has no finite value at t = {t:.9g}") from None
-        entries = [part for row in X for z in row for part in (Complex.of(z).re, Complex.of(z).im)]
+        entries = [part for row in X for z in row for part in _parts(z)]
         result = np.array([float(x) for x in (*entries, *xi, *rate)])
         if not np.all(np.isfinite(result)):
             raise InputError(f"the reference on {name} has no finite value at t = {t:.9g}")
@@ -178,6 +189,10 @@ def check_reference(reference: Reference, t0: float, t1: float, samples: int = 4
                 f"the reference on {name}, its velocity or its acceleration jumps by {size:.3g} at t = {low:.9g}; "
                 "tracking needs a twice differentiable reference: smooth it, or give waypoints"
             )
+
+
+def _parts(z: Any) -> tuple[float, float]:
+    return (z.re, z.im) if isinstance(z, Complex) else (z.real, z.imag)
 
 
 def _variable(dual: DualArithmetic, value: Scalar, rate: Scalar) -> Scalar:
@@ -272,10 +287,10 @@ def _on_group(group: MatrixGroup, X: NDArray[Any]) -> bool:
 
 
 def _quintic(
-    group: MatrixGroup, move: NDArray[Any], first: NDArray[Any], last: NDArray[Any], span: float
+    derivation: GroupDerivation, move: NDArray[Any], first: NDArray[Any], last: NDArray[Any], span: float
 ) -> NDArray[Any]:
     """(6, n): p(0) = 0, p(1) = move, body velocities first and last [1/s] and no body acceleration at either end."""
-    derivation, ops = GroupDerivation(group), FloatArithmetic()
+    ops = FloatArithmetic()
     inverse = np.array(jacobian(ops, derivation, [float(x) for x in move], "right", inverse=True), dtype=float)
     rate = inverse @ last * span
     dual = DualArithmetic(ops)
@@ -286,3 +301,29 @@ def _quintic(
     conditions = np.array([[1, 1, 1], [3, 4, 5], [6, 12, 20]], dtype=float)
     rest = np.linalg.solve(conditions, np.array([move - start, rate - start, bend]))
     return np.vstack([np.zeros_like(move), start, np.zeros_like(move), rest])
+
+
+def reference(
+    group: MatrixGroup,
+    formulas: Sequence[Any] | None = None,
+    *,
+    times: ArrayLike | None = None,
+    waypoints: ArrayLike | None = None,
+    start: Any = None,
+) -> Reference:
+    """A reference from formulas of t, or from waypoints; its velocity and acceleration are derived.
+
+    Args:
+        group: the group.
+        formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n).
+        times, waypoints: (k,) and (k, d, d), instead of formulas.
+        start: (d, d) for formulas.
+
+    Raises:
+        InputError: both or neither given; else as `formula_reference` and `waypoint_reference`.
+    """
+    if (formulas is None) == (times is None or waypoints is None):
+        raise InputError(f"a reference on {group.name} is given by formulas, or by times and waypoints")
+    if formulas is not None:
+        return formula_reference(group, formulas, start=start)
+    return waypoint_reference(group, np.asarray(times), np.asarray(waypoints))

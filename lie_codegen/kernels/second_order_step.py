@@ -25,80 +25,79 @@ from lie_codegen.kernels.group_matrices import random_element
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.kernels.linear import Vector, bracket, matmul, plus, scaled
 from lie_codegen.kernels.mechanics_kernels import acceleration_body
-from lie_codegen.kernels.reference_kernels import ReferenceBody
 from lie_codegen.kernels.rkmk import times_taylor_exp
 from lie_codegen.kernels.tracking_kernels import force_units
 from lie_codegen.kernels.wei_norman_body import WeiNormanData
 
 #: (ops, t, X, xi) -> (n,) body force.
 ForceBody = Callable[[Arithmetic, Scalar, Any, Vector], Vector]
+#: (ops, stage, t, X, xi) -> (n,) body force, stage 0, 1, 2 at t, t + h/2, t + h.
+StageForce = Callable[[Arithmetic, int, Scalar, Any, Vector], Vector]
 
 _ATTITUDE = ("X", "omega")
 _TRACKING = ("X", "xi", "X_d", "xi_d", "xi_d_dot")
 
 
-def law_force(law: Kernel | None, reference: Reference | None) -> ForceBody | None:
-    """The force of a law along a reference, as a body of (t, X, xi).
+def check_loop(law: Kernel | None, reference: Reference | None) -> None:
+    """A law that can be simulated, with the reference it needs.
 
     Raises:
         InputError: the law has other inputs than (X, omega) or (X, xi, X_d, xi_d, xi_d_dot), or lacks its reference.
     """
-    if law is None:
-        return None
-    names = tuple(port.name for port in law.inputs)
-    if names == _ATTITUDE:
-        return lambda ops, _t, X, xi: list(law.evaluate(ops, X, xi)[0])
-    if names != _TRACKING:
-        raise InputError(
-            f"the law {law.name} has the inputs {', '.join(names)}; a closed loop needs {', '.join(_ATTITUDE)} or "
-            f"{', '.join(_TRACKING)}"
-        )
-    if reference is None:
+    if law is not None and _tracks(law) and reference is None:
         raise InputError(f"the law {law.name} tracks: give it a reference")
-    body = ReferenceBody(reference)
-
-    def force(ops: Arithmetic, t: Scalar, X: Any, xi: Vector) -> Vector:
-        return list(law.evaluate(ops, X, xi, *body(ops, t))[0])
-
-    return force
-
-
-def total_force(forces: Sequence[ForceBody | None]) -> ForceBody | None:
-    """The sum of forces; None if there is none."""
-    given = [force for force in forces if force is not None]
-    if not given:
-        return None
-    return lambda ops, t, X, xi: plus(*[force(ops, t, X, xi) for force in given])
 
 
 def second_order_step(
-    group: MatrixGroup, inertia: Any, force: ForceBody | None = None, name: str = "second_order_step"
+    group: MatrixGroup,
+    inertia: Any,
+    force: ForceBody | None = None,
+    *,
+    law: Kernel | None = None,
+    name: str = "second_order_step",
 ) -> Kernel:
     """The step (state, t, h) -> (state_next,).
+
+    Under a tracking law the step takes the reference as inputs too: (X_d, xi_d, xi_d_dot) at t, t + h/2 and t + h, in
+    arrays of three rows, X_d flat; so it is evaluated once for any number of runs.
 
     Args:
         group: any matrix group.
         inertia: symmetric positive definite.
-        force: body force; None for a free body.
+        force: body force beside the law; None for none.
+        law: an attitude or tracking law; None for none.
         name: C identifier.
 
     Raises:
-        InputError: the inertia is not symmetric positive definite.
+        InputError: the inertia is not symmetric positive definite, or the law has other inputs than those.
     """
     metric = positive_matrix(inertia, group.dim, "inertia")
     size, move = packed_size(group), Move(group)
+    tracks = law is not None and _tracks(law)
 
-    def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *reference: Any) -> tuple[Any, ...]:
         X, xi = unpack(group, state[:size]), list(state[size:])
-        Theta, change = increments(ops, move, metric, force, X, xi, t, h)
+        stages = [(_square(group, X_d), xi_d, rate) for X_d, xi_d, rate in zip(*reference, strict=True)]
+
+        def applied(ops: Arithmetic, stage: int, time: Scalar, Y: Any, eta: Vector) -> Vector:
+            total: Vector = [0] * group.dim if force is None else force(ops, time, Y, eta)
+            if law is None:
+                return total
+            return plus(total, law.evaluate(ops, Y, eta, *(stages[stage] if tracks else ()))[0])
+
+        Theta, change = increments(ops, move, metric, applied, X, xi, t, h)
         return ([*pack(group, move(ops, X, Theta)), *plus(xi, change)],)
 
     data = WeiNormanData(group)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
-        X = random_element(group, data, rng)
-        xi = [rng.uniform(-1, 1) for _ in range(group.dim)]
-        return [*pack(group, X), *xi], rng.uniform(0, 1), rng.uniform(0, 0.05)
+        def vector() -> list[float]:
+            return [rng.uniform(-1, 1) for _ in range(group.dim)]
+
+        state = [*pack(group, random_element(group, data, rng)), *vector()]
+        flat = [[z for row in random_element(group, data, rng) for z in row] for _ in range(3)]
+        reference = (flat, [vector() for _ in range(3)], [vector() for _ in range(3)]) if tracks else ()
+        return state, rng.uniform(0, 1), rng.uniform(0, 0.05), *reference
 
     return Kernel(
         name=name,
@@ -107,6 +106,7 @@ def second_order_step(
             Port("state", (size + group.dim,), description="varying entries of X, row by row, then xi"),
             Port("t", (), "s"),
             Port("h", (), "s"),
+            *(_reference_ports(group) if tracks else ()),
         ),
         outputs=(Port("state_next", (size + group.dim,)),),
         body=body,
@@ -114,6 +114,35 @@ def second_order_step(
         source="Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)",
         sampler=sampler,
     )
+
+
+def _tracks(law: Kernel) -> bool:
+    """Whether the law takes a reference.
+
+    Raises:
+        InputError: its inputs are neither (X, omega) nor (X, xi, X_d, xi_d, xi_d_dot).
+    """
+    names = tuple(port.name for port in law.inputs)
+    if names not in (_ATTITUDE, _TRACKING):
+        raise InputError(
+            f"the law {law.name} has the inputs {', '.join(names)}; a closed loop needs {', '.join(_ATTITUDE)} or "
+            f"{', '.join(_TRACKING)}"
+        )
+    return names == _TRACKING
+
+
+def _reference_ports(group: MatrixGroup) -> tuple[Port, ...]:
+    when = "at t, t + h/2, t + h"
+    return (
+        Port("X_d", (3, group.degree**2), is_complex=group.is_complex, description=f"reference {when}, row by row"),
+        Port("xi_d", (3, group.dim), description=f"its velocity {when}"),
+        Port("xi_d_dot", (3, group.dim), description=f"the rate of that {when}"),
+    )
+
+
+def _square(group: MatrixGroup, flat: Sequence[Any]) -> list[list[Any]]:
+    d = group.degree
+    return [list(flat[d * i : d * (i + 1)]) for i in range(d)]
 
 
 def held_force_step(group: MatrixGroup, inertia: Any, name: str = "held_force_step") -> Kernel:
@@ -170,18 +199,18 @@ def increments(
     ops: Arithmetic,
     move: Move,
     inertia: sp.MatrixBase,
-    force: ForceBody | None,
+    force: StageForce,
     X: Any,
     xi: Vector,
     t: Scalar,
     h: Scalar,
 ) -> tuple[Vector, Vector]:
-    """Theta and the change of xi over a step."""
+    """Theta and the change of xi over a step; the force is told which of t, t + h/2, t + h it is asked for."""
     group = move.group
 
-    def acceleration(time: Scalar, Y: Any, eta: Vector) -> Vector:
-        applied = [0] * group.dim if force is None else force(ops, time, Y, eta)
-        return acceleration_body(ops, group, inertia, eta, applied)
+    def acceleration(stage: int, Y: Any, eta: Vector) -> Vector:
+        time = (t, t + h / 2, t + h)[stage]
+        return acceleration_body(ops, group, inertia, eta, force(ops, stage, time, Y, eta))
 
     def pulled(theta: Vector, eta: Vector) -> Vector:
         """Theta' = eta + [Theta, eta]/2 + [Theta, [Theta, eta]]/12, signs for X' = X hat(xi)."""
@@ -190,13 +219,13 @@ def increments(
         return [e + a / 2 + b / 12 for e, a, b in zip(eta, once, twice, strict=True)]
 
     half = h / 2
-    k1, a1 = xi, acceleration(t, X, xi)
+    k1, a1 = xi, acceleration(0, X, xi)
     theta, eta = scaled(half, k1), plus(xi, scaled(half, a1))
-    k2, a2 = pulled(theta, eta), acceleration(t + half, move(ops, X, theta), eta)
+    k2, a2 = pulled(theta, eta), acceleration(1, move(ops, X, theta), eta)
     theta, eta = scaled(half, k2), plus(xi, scaled(half, a2))
-    k3, a3 = pulled(theta, eta), acceleration(t + half, move(ops, X, theta), eta)
+    k3, a3 = pulled(theta, eta), acceleration(1, move(ops, X, theta), eta)
     theta, eta = scaled(h, k3), plus(xi, scaled(h, a3))
-    k4, a4 = pulled(theta, eta), acceleration(t + h, move(ops, X, theta), eta)
+    k4, a4 = pulled(theta, eta), acceleration(2, move(ops, X, theta), eta)
     weights = ((k1, a1, 1), (k2, a2, 2), (k3, a3, 2), (k4, a4, 1))
     Theta = plus(*[scaled(h * w / 6, k) for k, _, w in weights])
     return Theta, plus(*[scaled(h * w / 6, a) for _, a, w in weights])

@@ -16,7 +16,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.element_pattern import packed_size, varying_entries
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.kernels.reference_kernels import reference_kernel
-from lie_codegen.kernels.second_order_step import held_force_step, law_force
+from lie_codegen.kernels.second_order_step import check_loop, held_force_step
 from lie_codegen.simulation.second_order import initial_states
 
 _SHOWN = 50
@@ -74,7 +74,7 @@ def generate_closed_loop(
 
     for value, what in ((duration, "duration"), (step, "step")):
         positive_number(value, what)
-    law_force(law, reference)
+    check_loop(law, reference)
     kernels = [law, held_force_step(group, inertia)]
     kernels += [] if reference is None else [reference_kernel(reference)]
     start, many = initial_states(group, X0, xi0)

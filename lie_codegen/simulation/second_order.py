@@ -14,7 +14,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.element_pattern import packed_size, varying_entries
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.kernels.reference_kernels import check_reference, reference_kernel
-from lie_codegen.kernels.second_order_step import ForceBody, law_force, second_order_step, total_force
+from lie_codegen.kernels.second_order_step import ForceBody, check_loop, second_order_step
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
 
@@ -22,6 +22,8 @@ Array = NDArray[Any]
 
 _MOST_STEPS = 2**21
 _LARGEST_MOVE = 0.25
+#: Steps for which the reference is held in memory at once.
+_BLOCK = 20_000
 
 
 @dataclass(frozen=True)
@@ -81,15 +83,15 @@ def closed_loop(
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
     times = _times(t)
-    if reference is not None:
-        if reference.group != group:
-            raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")
-        check_reference(reference, float(times[0]), float(times[-1]))
-    force = total_force([law_force(law, reference), external])
-    kernels = [second_order_step(group, inertia, force)]
+    if reference is not None and reference.group != group:
+        raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")
+    check_loop(law, reference)
+    kernels = [second_order_step(group, inertia, external, law=law)]
     kernels += [law] if law is not None else []
     kernels += [reference_kernel(reference)] if reference is not None else []
     lib = build_kernels(lambda: kernels, namespace=group.name)
+    if reference is not None:
+        check_reference(reference, float(times[0]), float(times[-1]), lib.reference)
     start, many = initial_states(group, X0, xi0)
     if step is not None:
         count = max(1, int(np.ceil((times[1] - times[0]) / step - 1e-9)))
@@ -154,16 +156,42 @@ def _run(lib: Library, start: Array, times: Array, every: int, many: bool) -> Ar
     """(k, N, m) or (k, m) states at the times, `every` steps from one to the next."""
     total = every * (len(times) - 1)
     h = (times[-1] - times[0]) / total
-    if not many:
-        clock = times[0] + h * np.arange(total)
-        return np.asarray(lib.second_order_step.scan(start[0], n=total, every=every, t=clock, h=h))
-    states = np.empty((len(times), *start.shape))
-    states[0] = current = start
-    for index in range(total):
-        current = lib.second_order_step.batch(state=current, t=times[0] + h * index, h=h)
+    block = every * max(1, _BLOCK // every)
+    states = [start[None] if many else start[0][None]]
+    for first in range(0, total, block):
+        count = min(block, total - first)
+        stages = _stages(lib, times[0] + h * first, h, count)
+        clock = times[0] + h * (first + np.arange(count))
+        if many:
+            states.append(_advance_all(lib, states[-1][-1], clock, h, stages, every))
+        else:
+            run = lib.second_order_step.scan(states[-1][-1], n=count, every=every, t=clock, h=h, **stages)
+            states.append(np.asarray(run)[1:])
+    return np.concatenate(states)
+
+
+def _stages(lib: Library, start: float, h: float, count: int) -> dict[str, Array]:
+    """The reference at the ends and the middle of each step, as the step takes it; nothing for other laws."""
+    names = [port.name for port in lib.second_order_step.inputs[3:]]
+    if not names:
+        return {}
+    X, xi, rate = lib.reference.batch(start + h / 2 * np.arange(2 * count + 1))
+    flat = (X.reshape(len(X), -1), xi, rate)
+    return {
+        name: np.ascontiguousarray(np.stack([values[:-1:2], values[1::2], values[2::2]], axis=1))
+        for name, values in zip(names, flat, strict=True)
+    }
+
+
+def _advance_all(lib: Library, current: Array, clock: Array, h: float, stages: dict[str, Array], every: int) -> Array:
+    """(count / every, N, m) states of many runs."""
+    kept = np.empty((len(clock) // every, *current.shape))
+    for index, t in enumerate(clock):
+        now = {name: values[index] for name, values in stages.items()}
+        current = lib.second_order_step.batch(state=current, t=float(t), h=h, **now)
         if (index + 1) % every == 0:
-            states[(index + 1) // every] = current
-    return states
+            kept[(index + 1) // every - 1] = current
+    return kept
 
 
 def _refined(
