@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -37,16 +38,18 @@ def rkmk4_increment(
     Munthe-Kaas, BIT 38 (1998) 92.
     """
 
+    half, twelfth = ops.constant(Fraction(1, 2)), ops.constant(Fraction(1, 12))  # products are cheaper than quotients
+
     def rate_at(theta: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
         first = bracket_body(group, ops, theta, u)
         second = bracket_body(group, ops, theta, first)
-        return [v + a / 2 + b / 12 for v, a, b in zip(u, first, second, strict=True)]
+        return [v + half * a + twelfth * b for v, a, b in zip(u, first, second, strict=True)]
 
     k1 = list(u0)
-    k2 = rate_at([h * k / 2 for k in k1], um)
-    k3 = rate_at([h * k / 2 for k in k2], um)
+    k2 = rate_at([half * h * k for k in k1], um)
+    k3 = rate_at([half * h * k for k in k2], um)
     k4 = rate_at([h * k for k in k3], u1)
-    return [h * (a + 2 * (b + c) + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+    return [h / 6 * (a + 2 * (b + c) + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
 
 
 def times_taylor_exp(
@@ -61,9 +64,10 @@ def times_taylor_exp(
     generator = hat_body(group, ops, theta)
     value: list[list[Any]] = [list(row) for row in X]
     for order in range(degree, 0, -1):
+        factor = ops.constant(Fraction(1, order))
         value = [
             [
-                _moved(X[i][j], sum_products((value[i][m], generator[m][j]) for m in range(size)), order)
+                _moved(X[i][j], sum_products((value[i][m], generator[m][j]) for m in range(size)), factor)
                 for j in range(size)
             ]
             for i in range(size)
@@ -71,8 +75,8 @@ def times_taylor_exp(
     return value
 
 
-def _moved(entry: Any, total: Any, order: int) -> Any:
-    return entry if is_zero(total) else entry + total / order
+def _moved(entry: Any, total: Any, factor: Scalar) -> Any:
+    return entry if is_zero(total) else entry + total * factor
 
 
 def hat_body(group: MatrixGroup, ops: Arithmetic, x: Sequence[Scalar]) -> list[list[Any]]:
@@ -151,7 +155,7 @@ def wei_norman_step(group: MatrixGroup) -> Kernel:
         k2 = rate(ops, data, moved(k1, h / 2), um)
         k3 = rate(ops, data, moved(k2, h / 2), um)
         k4 = rate(ops, data, moved(k3, h), u1)
-        return ([x + h * (a + 2 * (b + c) + e) / 6 for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
+        return ([x + h / 6 * (a + 2 * (b + c) + e) for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
 
     return Kernel(
         name="wei_norman_step",
