@@ -28,13 +28,11 @@ class EvenSpectrum:
         pairs: r.
         multiplicity: m.
         has_zero: whether zero is an eigenvalue for every x.
-        antisymmetric: whether every A(x) is antisymmetric.
     """
 
     pairs: int
     multiplicity: int
     has_zero: bool
-    antisymmetric: bool
 
 
 def even_spectrum(matrices: Sequence[sp.MatrixBase], most_pairs: int = 6) -> EvenSpectrum | None:
@@ -47,12 +45,11 @@ def even_spectrum(matrices: Sequence[sp.MatrixBase], most_pairs: int = 6) -> Eve
     squares = [
         _square_at(flat, size, prime, random_point(random.Random(k), prime, len(matrices))) for k in range(_POINTS)
     ]
-    antisymmetric = all((m + m.T).is_zero_matrix for m in matrices)
     for pairs in range(1, min(size // 2, most_pairs) + 1):
         for multiplicity in range(2, size // pairs + 1, 2):
             has_zero = pairs * multiplicity < size
             if all(_vanishes(B, pairs, multiplicity, has_zero, prime) for B in squares):
-                return EvenSpectrum(pairs, multiplicity, has_zero, antisymmetric)
+                return EvenSpectrum(pairs, multiplicity, has_zero)
     return None
 
 

@@ -49,7 +49,9 @@ def exp_matrix(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> l
     if data.matrix_pattern is None:
         traceless = all(matrix.trace() == 0 for matrix in group.exact_basis)
         A = hat_body(group, ops, x)
-        return exponential(ops, A, data.matrix_spectrum, unitary=data.is_unitary, traceless=traceless)
+        return exponential(
+            ops, A, data.matrix_spectrum, data.matrix_relation, unitary=data.is_unitary, traceless=traceless
+        )
     d = group.degree
     function = FunctionOfMatrix(LinearFamily(ops, data.real.basis, x), data.matrix_pattern, EXP)
     columns = [function.column(j) for j in range(d)]
@@ -62,7 +64,8 @@ def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: 
     """(n, n) ljac or rjac of x, or its inverse; singular where ad x has an eigenvalue 2 pi i k, k != 0."""
     if data.adjoint_pattern is None and data.adjoint_spectrum is not None:
         function = inverse_jacobian_of_exp if inverse else jacobian_of_exp
-        return function(ops, ad_body(ops, data, x), data.adjoint_spectrum, 1 if side == "left" else -1)
+        sign = 1 if side == "left" else -1
+        return function(ops, ad_body(ops, data, x), data.adjoint_spectrum, data.adjoint_relation, sign)
     if data.adjoint_pattern is None:
         return _plain(ops, data, x, 1 if side == "left" else -1, inverse=inverse)
     family = LinearFamily(ops, data.ads, x)

@@ -7,9 +7,10 @@ from functools import cached_property
 
 import sympy as sp
 
-from lie_codegen.algebra.adjoint import ad
+from lie_codegen.algebra.adjoint import ad, killing_form
 from lie_codegen.algebra.block_structure import diagonal_blocks
 from lie_codegen.algebra.even_spectrum import EvenSpectrum, even_spectrum
+from lie_codegen.algebra.invariant_form import Relation, entry_relation, matrix_relation
 from lie_codegen.algebra.spectral_pattern import ColumnPattern, spectral_pattern
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -88,3 +89,13 @@ class GroupDerivation:
         return self.group.is_complex and all(
             (m + m.H).applyfunc(sp.expand).is_zero_matrix for m in self.group.exact_basis
         )
+
+    @cached_property
+    def matrix_relation(self) -> Relation:
+        """Which entries of a function of hat(x) follow from others."""
+        return {} if self.group.is_complex else matrix_relation(self.group.exact_basis)
+
+    @cached_property
+    def adjoint_relation(self) -> Relation:
+        """Which entries of a function of ad x follow from others: by antisymmetry, else by the Killing form."""
+        return matrix_relation(self.ads) or entry_relation(killing_form(self.group.algebra))

@@ -41,7 +41,7 @@ def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Entries) -> Vecto
     if structure is None:
         matrices = GroupMatrices(ops, data.real)
         X_inverse = matrices.write(matrices.inverse(matrices.read(X)))
-        A = logarithm(ops, X, X_inverse, data.matrix_spectrum, unitary=data.is_unitary)
+        A = logarithm(ops, X, X_inverse, data.matrix_spectrum, data.matrix_relation, unitary=data.is_unitary)
         return coordinates(ops, data, A)
     logs = [value for block in structure.blocks for value in block_log(ops, block, X)]
     x: Vector = [0] * data.group.dim

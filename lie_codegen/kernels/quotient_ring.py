@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+from lie_codegen.algebra.invariant_form import Relation
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, product
 from lie_codegen.kernels.complex_scalar import Complex
-from lie_codegen.kernels.linear import Matrix, identity, matadd, matmul, scaled
+from lie_codegen.kernels.linear import Matrix, identity, matadd, number, scaled
 from lie_codegen.kernels.small_inverse import inverse
 
 Element = list[Scalar]
@@ -110,8 +111,10 @@ class QuotientRing:
         return [factor * (a[0] + root), factor * a[1]]
 
 
-def matrix_value(element: Element, powers: Sequence[Matrix], *, symmetric: bool = False) -> Matrix:
-    """sum_i element[i] B^i from I, B, .., B^b: Horner's rule in B^b, whose products are symmetric if `symmetric`."""
+def matrix_value(
+    ops: Arithmetic, element: Element, powers: Sequence[Matrix], relation: Relation | None = None
+) -> Matrix:
+    """sum_i element[i] B^i from I, B, .., B^b: Horner's rule in B^b, whose products obey the relation (sign 1)."""
     block = len(powers) - 1
     chunks = [element[start : start + block] for start in range(0, len(element), block)]
     if len(chunks) > 1 and len(chunks[-1]) == 1:
@@ -121,7 +124,7 @@ def matrix_value(element: Element, powers: Sequence[Matrix], *, symmetric: bool 
     else:
         total = _combination(chunks.pop(), powers)
     for chunk in reversed(chunks):
-        moved = symmetric_product(powers[block], total, 1) if symmetric else matmul(powers[block], total)
+        moved = related_product(ops, powers[block], total, 1, relation or {})
         total = matadd(_combination(chunk, powers), moved)
     return total
 
@@ -133,21 +136,25 @@ def _combination(coefficients: Sequence[Scalar], powers: Sequence[Matrix]) -> Ma
     return total
 
 
-def symmetric_product(a: Matrix, b: Matrix, sign: int) -> Matrix:
-    """a b, known to be symmetric (sign 1) or antisymmetric (sign -1): one triangle is computed."""
+def related_product(ops: Arithmetic, a: Matrix, b: Matrix, sign: int, relation: Relation) -> Matrix:
+    """M = a b where M_p = sign factor M_q is known for positions p and relation[p] = (q, factor): one of each pair is computed."""
     size = len(a)
     columns = list(zip(*b, strict=True))
-    result = identity(size)
-    for i in range(size):
-        for j in range(i, size):
-            value: Scalar = 0
-            if sign == 1 or i != j:
-                for x, y in zip(a[i], columns[j], strict=True):
-                    value = add(value, product(x, y))
-            result[i][j] = value
-            if j != i:
-                result[j][i] = product(sign, value)
-    return result
+    known: dict[tuple[int, int], Scalar] = {}
+    for place in ((i, j) for i in range(size) for j in range(size)):
+        if place in known:
+            continue
+        other, factor = relation.get(place, (place, 1))
+        if other == place and sign * factor == -1 and place in relation:
+            known[place] = 0
+            continue
+        value: Scalar = 0
+        for x, y in zip(a[place[0]], columns[place[1]], strict=True):
+            value = add(value, product(x, y))
+        known[place] = value
+        if other != place:
+            known[other] = product(number(ops, sign / factor), value)
+    return [[known[i, j] for j in range(size)] for i in range(size)]
 
 
 def trace_of_product(a: Matrix, b: Matrix) -> Scalar:

@@ -18,12 +18,13 @@ from fractions import Fraction
 from math import factorial
 
 from lie_codegen.algebra.even_spectrum import EvenSpectrum, newton_coefficients
+from lie_codegen.algebra.invariant_form import Relation
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, product
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.cotangent import four_pi_squared, taylor
 from lie_codegen.kernels.linear import Matrix, identity, matadd, matmul, scaled
-from lie_codegen.kernels.quotient_ring import Element, QuotientRing, matrix_value, power_sums, symmetric_product
+from lie_codegen.kernels.quotient_ring import Element, QuotientRing, matrix_value, power_sums, related_product
 
 _HALVINGS = 4
 _EVEN_TERMS = 11
@@ -34,15 +35,18 @@ _POLES = 3
 _REMAINDER_TERMS = 18
 
 
-def exponential(ops: Arithmetic, A: Matrix, even: EvenSpectrum | None, *, unitary: bool, traceless: bool) -> Matrix:
+def exponential(
+    ops: Arithmetic, A: Matrix, even: EvenSpectrum | None, relation: Relation, *, unitary: bool, traceless: bool
+) -> Matrix:
     """exp(A); `unitary` where A is complex and antihermitian."""
     if even is not None:
-        B = matmul(A, A)
-        ring, powers = even_ring(ops, B, even)
+        B = related_product(ops, A, A, 1, relation)
+        ring, powers = even_ring(ops, B, even, relation)
         V, S = _half_scale(ring)
         cosh, sinh = _doubled(ring, V, S)
         cosh[0] = add(cosh[0], 1)
-        return matadd(matrix_value(cosh, powers), matmul(A, matrix_value(sinh, powers)))
+        odd = related_product(ops, A, matrix_value(ops, sinh, powers, relation), -1, relation)
+        return matadd(matrix_value(ops, cosh, powers, relation), odd)
     if unitary:
         # A = i H: cosine and sine of H have real coefficients.
         H = [[_times_i(entry, -1) for entry in row] for row in A]
@@ -50,25 +54,24 @@ def exponential(ops: Arithmetic, A: Matrix, even: EvenSpectrum | None, *, unitar
         V, S = _half_scale(ring, step=1, sign=-1)
         cosine, sine = _doubled(ring, V, S)
         cosine[0] = add(cosine[0], 1)
-        return matrix_value([Complex(c, s) for c, s in zip(cosine, sine, strict=True)], powers)
+        return matrix_value(ops, [Complex(c, s) for c, s in zip(cosine, sine, strict=True)], powers)
     ring, powers = _plain_ring(ops, A, traceless=traceless)
     scale = Fraction(1, 2**_HALVINGS)
     value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, _EXP_TERMS)])
     for _ in range(_HALVINGS):
         value = ring.plus(ring.times(value, value), value, 2)
     value[0] = add(value[0], 1)
-    return matrix_value(value, powers)
+    return matrix_value(ops, value, powers)
 
 
-def jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, sign: int) -> Matrix:
+def jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, relation: Relation, sign: int) -> Matrix:
     """(e^a - 1)/a at a = sign ad = sinh(a)/a + a (cosh(a) - 1)/a^2, the last as 2 (sinh(a/2)/a)^2."""
-    ring, powers = even_ring(ops, _square(ad, even), even)
+    ring, powers = even_ring(ops, related_product(ops, ad, ad, 1, relation), even, relation)
     V, S = _half_scale(ring)
     _, sinh = _doubled(ring, V, S)
     odd = ring.scaled(2 * sign, ring.times(S, S))
-    symmetric = even.antisymmetric
-    first, second = (matrix_value(e, powers, symmetric=symmetric) for e in (sinh, odd))
-    return matadd(first, symmetric_product(ad, second, -1) if symmetric else matmul(ad, second))
+    first, second = (matrix_value(ops, e, powers, relation) for e in (sinh, odd))
+    return matadd(first, related_product(ops, ad, second, -1, relation))
 
 
 def plain_jacobian_of_exp(ops: Arithmetic, ad: Matrix, *, traceless: bool, sign: int) -> Matrix:
@@ -81,12 +84,12 @@ def plain_jacobian_of_exp(ops: Arithmetic, ad: Matrix, *, traceless: bool, sign:
     for _ in range(_HALVINGS):
         phi = ring.plus(phi, ring.times(value, phi), half)
         value = ring.plus(ring.times(value, value), value, 2)
-    return matrix_value(phi, powers)
+    return matrix_value(ops, phi, powers)
 
 
-def inverse_jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, sign: int) -> Matrix:
+def inverse_jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, relation: Relation, sign: int) -> Matrix:
     """a/(e^a - 1) at a = sign ad: a/2 coth(a/2) by its three nearest poles and a series, and -a/2."""
-    ring, powers = even_ring(ops, _square(ad, even), even)
+    ring, powers = even_ring(ops, related_product(ops, ad, ad, 1, relation), even, relation)
     poles = [four_pi_squared() * k * k for k in range(1, _POLES + 1)]
     total = ring.series([_remainder(j, poles) for j in range(_REMAINDER_TERMS)])
     for pole in poles:
@@ -94,17 +97,19 @@ def inverse_jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, sig
     total = ring.shifted(total)
     total[0] = add(total[0], 1)
     half = ops.constant(Fraction(-sign, 2))
-    return matadd(matrix_value(total, powers, symmetric=even.antisymmetric), ad, half)
+    return matadd(matrix_value(ops, total, powers, relation), ad, half)
 
 
-def logarithm(ops: Arithmetic, X: Matrix, X_inverse: Matrix, even: EvenSpectrum | None, *, unitary: bool) -> Matrix:
+def logarithm(
+    ops: Arithmetic, X: Matrix, X_inverse: Matrix, even: EvenSpectrum | None, relation: Relation, *, unitary: bool
+) -> Matrix:
     """log(X) from X and its inverse."""
     half = ops.constant(Fraction(1, 2))
     S = [scaled(half, row) for row in matadd(X, X_inverse, -1)]
     V = matadd([scaled(half, row) for row in matadd(X, X_inverse)], identity(len(X)), -1)
     if even is not None:
         # S annihilates the eigenvalue zero, which therefore needs no factor.
-        ring, powers = even_ring(ops, V, EvenSpectrum(even.pairs, even.multiplicity, False, False))
+        ring, powers = even_ring(ops, V, EvenSpectrum(even.pairs, even.multiplicity, False), relation)
     else:
         ring, powers = _plain_ring(ops, V, traceless=False, real=unitary)
     v = [0, 1] + [0] * (ring.r - 2) if ring.r > 1 else ring.shifted([1])
@@ -117,13 +122,13 @@ def logarithm(ops: Arithmetic, X: Matrix, X_inverse: Matrix, even: EvenSpectrum 
         v = [add(cosh[0], -1), *cosh[1:]]
     series = [Fraction((-2) ** j * factorial(j) ** 2, factorial(2 * j + 1)) for j in range(_LOG_TERMS)]
     g = ring.times(ring.compose(series, v), ring.inverse(divisor))
-    return matmul(S, matrix_value(g, powers))
+    return matmul(S, matrix_value(ops, g, powers))
 
 
-def even_ring(ops: Arithmetic, B: Matrix, even: EvenSpectrum) -> tuple[QuotientRing, list[Matrix]]:
+def even_ring(ops: Arithmetic, B: Matrix, even: EvenSpectrum, relation: Relation) -> tuple[QuotientRing, list[Matrix]]:
     """The ring of polynomials in B = A^2, and the powers of B that its elements are summed from."""
     degree = even.pairs + even.has_zero
-    powers = _powers(B, max((even.pairs + 1) // 2, 1 if degree < 3 else 2 if degree < 6 else 3), even.antisymmetric)
+    powers = _powers(ops, B, max((even.pairs + 1) // 2, 1 if degree < 3 else 2 if degree < 6 else 3), relation)
     share = ops.constant(Fraction(1, even.multiplicity))
     sums = [product(share, value) for value in power_sums(powers, even.pairs)]
     coefficients = newton_coefficients(sums)
@@ -134,7 +139,7 @@ def _plain_ring(
     ops: Arithmetic, A: Matrix, *, traceless: bool, real: bool = False
 ) -> tuple[QuotientRing, list[Matrix]]:
     size = len(A)
-    powers = _powers(A, max((size + 1) // 2, 1 if size < 3 else 2), symmetric=False)
+    powers = _powers(ops, A, max((size + 1) // 2, 1 if size < 3 else 2), {})
     sums = power_sums(powers, size)
     if traceless:
         sums[0] = 0
@@ -143,17 +148,13 @@ def _plain_ring(
     return QuotientRing(ops, newton_coefficients(sums)), powers
 
 
-def _powers(A: Matrix, highest: int, symmetric: bool) -> list[Matrix]:
+def _powers(ops: Arithmetic, A: Matrix, highest: int, relation: Relation) -> list[Matrix]:
     powers = [identity(len(A)), A]
     while len(powers) <= highest:
         half = len(powers) // 2
         a, b = powers[half], powers[len(powers) - half]
-        powers.append(symmetric_product(a, b, 1) if symmetric else matmul(a, b))
+        powers.append(related_product(ops, a, b, 1, relation))
     return powers
-
-
-def _square(ad: Matrix, even: EvenSpectrum) -> Matrix:
-    return symmetric_product(ad, ad, 1) if even.antisymmetric else matmul(ad, ad)
 
 
 def _half_scale(ring: QuotientRing, step: int = 0, sign: int = 1) -> tuple[Element, Element]:
