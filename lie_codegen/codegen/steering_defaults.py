@@ -32,5 +32,5 @@ class Defaults:
         if dim <= 3 and depth <= 1:
             return Defaults(16, 16, 16)
         if depth <= 1:
-            return Defaults(64, 16, 16)
-        return Defaults(128, 20, 32)
+            return Defaults(192, 16, 16)
+        return Defaults(256, 24, 40)

@@ -113,7 +113,8 @@ def feedback(
 
 
 def _planned(task: Task, planner: str, options: dict[str, Any]) -> Controls:
-    if planner != "area_rule":
+    size = distance(task.group, task.target, np.eye(task.group.degree))
+    if planner != "area_rule" and size > task.tolerance:
         from lie_codegen.steering.front import steer
 
         plan = steer(

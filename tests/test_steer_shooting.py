@@ -1,0 +1,202 @@
+"""Exact minimum-energy steering: published costs, an integration that shares no code, random targets."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import lie_codegen as lc
+from lie_codegen.codegen.steering_defaults import Defaults
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.extremal import Extremal
+from lie_codegen.steering.plan import Plan
+from lie_codegen.steering.shooting import SOLVED, shooter
+from lie_codegen.steering.shooting_numpy import NumpyShooting
+
+SYSTEMS = {"so3": ("w1", "w2"), "se2": (0, 1), "h3": (0, 1), "su2": (0, 1), "se3": (0, 1, 2, 3)}
+
+
+def heisenberg_target() -> NDArray[np.float64]:
+    return expm(lc.group("h3").hat([0, 0, 1.0]))
+
+
+def se3_target() -> NDArray[np.float64]:
+    so3 = lc.group("so3")
+    T = np.eye(4)
+    for x, A in zip((0.3, -0.2, 0.4), so3.basis, strict=True):
+        T[:3, :3] = T[:3, :3] @ expm(x * A)
+    T[:3, 3] = (0.5, 0.3, -0.2)
+    return T
+
+
+def random_targets(group: MatrixGroup, count: int, seed: int, size: float = 2.0) -> NDArray[np.float64]:
+    rng = np.random.default_rng(seed)
+    return np.array([expm(group.hat(rng.uniform(-size, size, group.dim))) for _ in range(count)])
+
+
+def integrated(group: MatrixGroup, plan: Plan) -> NDArray[np.float64]:
+    """X(T) by scipy's DOP853 on the matrix entries."""
+    d = group.degree
+
+    def rate(t: float, x: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return (x.reshape(d, d) @ group.hat(plan.u(t))).ravel()
+
+    start = np.eye(d, dtype=group.basis.dtype).ravel()
+    knots = np.concatenate([[0.0], plan.u.breakpoints, [plan.duration]])
+    for a, b in pairwise(knots):
+        start = solve_ivp(rate, (a, b), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return start.reshape(d, d)
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "cost"),
+    [
+        ("h3", heisenberg_target(), 4 * np.pi),
+        ("se2", np.array([[0, -1, 1], [1, 0, 1], [0, 0, 1.0]]), 4.891645516826),
+        ("se3", se3_target(), 2.831793229318),
+    ],
+)
+def test_published_minimum_energies(name: str, target: NDArray[np.float64], cost: float) -> None:
+    plan = lc.steer(lc.group(name), target, SYSTEMS[name], 1.0, method="optimal")
+    assert plan.cost == pytest.approx(cost, rel=1e-10)
+    assert plan.error < 1e-10
+
+
+@pytest.mark.parametrize("phi", [0.05, 0.8, 2.0, 3.0, np.pi])
+def test_so3_about_the_missing_axis(phi: float) -> None:
+    so3 = lc.group("so3")
+    plan = lc.steer(so3, expm(phi * so3.basis[2]), ("w1", "w2"), 3.0, method="optimal")
+    assert plan.cost * 3.0 == pytest.approx(phi * (4 * np.pi - phi), rel=1e-9)
+    assert plan.error < 1e-10
+    assert plan.details["conjugate_target"]
+    assert not plan.details["conjugate_times"]
+
+
+def test_the_satellite_costs_what_the_paper_page_says() -> None:
+    plan = lc.steer(lc.group("so3"), [0.1, 0.05, np.pi / 40], ("w1", "w2"), 24.0)
+    assert plan.method == "optimal"
+    assert plan.cost == pytest.approx(0.80350066222184167 / 24, rel=1e-12)
+    assert "not proved" in plan.details["optimality"]
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_plans_hold_against_an_independent_integration(name: str) -> None:
+    group = lc.group(name)
+    target = random_targets(group, 1, seed=4, size=1.0)[0]
+    plan = lc.steer(group, target, SYSTEMS[name], 2.0, method="optimal")
+    np.testing.assert_allclose(integrated(group, plan), target, atol=2e-10)
+    speed = np.sum(plan.u(np.linspace(0, 2.0, 50)) ** 2, axis=1)
+    np.testing.assert_allclose(speed, speed[0], rtol=1e-10)
+
+
+def test_sensitivities_against_differences() -> None:
+    group = lc.group("se2")
+    solver = shooter(group, (0, 1))
+    mu0 = np.array([1.0, -0.7, 2.0])
+    exact = solver.extremal(mu0).sensitivities[-1]
+    h = 1e-5
+    for column in range(3):
+        e = h * np.eye(3)[column]
+        after, before = (solver.extremal(mu0 + sign * e).X[-1] for sign in (1, -1))
+        X = solver.extremal(mu0).X[-1]
+        slope = group.project(np.linalg.solve(X, after - before)) / (2 * h)
+        np.testing.assert_allclose(exact[:, column], slope, atol=1e-8)
+
+
+def test_an_extremal_past_its_conjugate_point_is_told() -> None:
+    """Heisenberg: mu = (1, 0, p) turns at rate p; the first conjugate time is 2 pi / p."""
+    group = lc.group("h3")
+    solver = shooter(group, (0, 1))
+    beyond = solver.extremal([1.0, 0.2, 8.0])
+    assert beyond.conjugate_times()[0] == pytest.approx(2 * np.pi / 8, abs=0.01)
+    assert solver.extremal([1.0, 0.2, 6.0]).conjugate_times() == ()
+
+
+def test_weights_make_a_control_dearer() -> None:
+    group = lc.group("so3")
+    target = random_targets(group, 1, seed=8, size=0.8)[0]
+    even = lc.steer(group, target, ("w1", "w2"), 1.0)
+    dear = lc.steer(group, target, ("w1", "w2"), 1.0, weights=(4.0, 1.0))
+    assert dear.error < 1e-10
+    times = np.linspace(0, 1, 400)
+    assert np.sum(dear.u(times)[:, 0] ** 2) < np.sum(even.u(times)[:, 0] ** 2)
+    weighted = np.trapezoid(dear.u(times) ** 2 @ np.array([4.0, 1.0, 0.0]), times)
+    assert dear.details["weighted_cost"] == pytest.approx(weighted, rel=1e-4)
+    assert dear.details["weighted_cost"] < np.trapezoid(even.u(times) ** 2 @ np.array([4.0, 1.0, 0.0]), times)
+
+
+@pytest.mark.parametrize("name", ["so3", "se2", "su2"])
+def test_numpy_stands_in_for_the_compiler(name: str) -> None:
+    group = lc.group(name)
+    compiled = shooter(group, (0, 1))
+    plain = NumpyShooting(group, (0, 1), 1, Defaults(8, 12, 12))
+    target = random_targets(group, 1, seed=2, size=0.6)
+    a, b = compiled.solve(target), plain.solve(target, np.ones(2), 8)
+    assert b.status[0] == SOLVED
+    np.testing.assert_allclose(a.cost, b.cost, rtol=1e-8)
+    extremal = Extremal(group, (0, 1), np.ones(2), b.mu0[0], plain.sample(b.mu0[0], np.ones(2), 33))
+    np.testing.assert_allclose(extremal.X[-1], target[0], atol=1e-8)
+
+
+def gell_mann() -> MatrixGroup:
+    """su(3): -i/2 of the Gell-Mann matrices, the first replaced by 1 + 6 and the second by 3, so that two controls do."""
+    i_unit, half = sp.I, sp.Rational(1, 2)
+    unit = [[sp.Matrix(3, 3, lambda r, c, i=i, j=j: int((r, c) == (i, j))) for j in range(3)] for i in range(3)]
+    sym = {(i, j): unit[i][j] + unit[j][i] for i in range(3) for j in range(i + 1, 3)}
+    skew = {(i, j): -i_unit * unit[i][j] + i_unit * unit[j][i] for i in range(3) for j in range(i + 1, 3)}
+    l3, l8 = unit[0][0] - unit[1][1], unit[0][0] + unit[1][1] - 2 * unit[2][2]
+    hermitian = [sym[0, 1] + sym[1, 2], l3 + l8 / 3, sym[0, 1], skew[0, 1], l8, sym[0, 2], skew[0, 2], skew[1, 2]]
+    matrices = [(-i_unit * half * m).tolist() for m in hermitian]
+    return lc.from_matrices("su3_two", tuple("abcdefgh"), matrices)
+
+
+DEEP = {
+    "se3 with three controls": (lambda: lc.group("se3"), (0, 1, 3)),
+    "engel": (lambda: lc.from_brackets("engel4", tuple("abcd"), {("a", "b"): {"c": 1}, ("a", "c"): {"d": 1}}), (0, 1)),
+    "su3 with two controls": (gell_mann, (0, 1)),
+}
+
+
+@pytest.mark.parametrize("case", DEEP)
+def test_brackets_of_brackets(case: str) -> None:
+    make, controls = DEEP[case]
+    group = make()
+    found = shooter(group, controls).solve(random_targets(group, 6, seed=5, size=0.5))
+    assert np.all(found.status == SOLVED)
+    assert np.max(found.residual) < 1e-10
+
+
+def test_batches_and_threads_give_the_single_answers() -> None:
+    solver = shooter(lc.group("so3"), (0, 1))
+    targets = random_targets(solver.group, 21, seed=1)
+    together = solver.solve(targets)
+    parallel = solver.solve(targets, threads=2)
+    alone = np.array([solver.solve(target).cost[0] for target in targets])
+    np.testing.assert_array_equal(together.cost.shape, (21,))
+    np.testing.assert_allclose(together.cost, alone, rtol=1e-9)
+    np.testing.assert_allclose(parallel.cost, alone, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["so3", "se2", "h3"])
+def test_random_targets_are_solved_globally(name: str) -> None:
+    solver = shooter(lc.group(name), SYSTEMS[name])
+    targets = random_targets(solver.group, 100, seed=11)
+    found, best = solver.solve(targets), solver.solve(targets, starts=500)
+    assert np.all(found.status == SOLVED)
+    assert np.mean(found.cost <= 1.001 * np.fmin(found.cost, best.cost)) >= 0.99
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "share"), [("so3", 0.99), ("se2", 0.99), ("h3", 0.99), ("su2", 0.99), ("se3", 0.95)])
+def test_a_thousand_random_targets(name: str, share: float) -> None:
+    solver = shooter(lc.group(name), SYSTEMS[name])
+    targets = random_targets(solver.group, 1000, seed=12)
+    found, best = solver.solve(targets), solver.solve(targets, starts=500, threads=2)
+    assert np.all(found.status == SOLVED)
+    assert np.mean(found.cost <= 1.001 * np.fmin(found.cost, best.cost)) >= share
