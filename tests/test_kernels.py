@@ -24,7 +24,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import FloatArithmetic
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.cotangent import CotangentFunctions, taylor
-from lie_codegen.kernels.dual import mpmath_arithmetic
+from lie_codegen.kernels.dual import decimal_arithmetic
 from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_kernels import KERNEL_NAMES, group_kernel, group_kernels
 from lie_codegen.kernels.log_structure import log_structure
@@ -180,7 +180,7 @@ def test_entire_functions_against_their_series(z: str) -> None:
         for k in range(top + 1):
             wanted = sp.N(sum((-exact) ** j / sp.factorial(2 * j + k) for j in range(60)), 30)
             assert functions.c(k) == pytest.approx(float(wanted), rel=4e-14, abs=3e-16)
-    ops = mpmath_arithmetic(60)
+    ops = decimal_arithmetic(60)
     for a in range(3):
         for order in range(3):
             ours = CotangentFunctions(FloatArithmetic(), value, signed=value < 0).tail(a, order)

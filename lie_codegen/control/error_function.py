@@ -189,7 +189,9 @@ def _matrix(what: str, rows: Any, symbols: ErrorSymbols, values: Mapping[str, An
 
 
 def _entry(entry: Any, names: Mapping[str, sp.Expr]) -> sp.Expr:
-    return parse_expression(entry, names, FORMULA_FUNCTIONS) if isinstance(entry, str) else sp.S(entry)
+    if isinstance(entry, str):
+        return parse_expression(entry, names, FORMULA_FUNCTIONS)
+    return entry if isinstance(entry, sp.Expr) else real_number(entry, "an entry of the transport")
 
 
 def _check_symbols(what: str, used: Sequence[sp.Symbol] | set[sp.Symbol], symbols: ErrorSymbols) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from lie_codegen.algebra.exact import exact_number
 from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -96,7 +97,7 @@ def _formula(entry: Any) -> sp.Expr:
         return formula
     if isinstance(entry, float):
         return sp.Rational(repr(entry))
-    value = sp.S(entry)
+    value = entry if isinstance(entry, sp.Expr) else exact_number(entry)
     value = value.subs({symbol: TIME for symbol in value.free_symbols if symbol.name == "t"})
     if value.free_symbols - {TIME}:
         raise InputError(

@@ -12,12 +12,20 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from lie_codegen.algebra.exponential import MatrixExponential
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.errors import ExpressionError, IncompatibleError, InputError
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernels.arithmetic import Arithmetic
-from lie_codegen.kernels.dual import DualArithmetic, PlainArithmetic, fraction_arithmetic, mpmath_arithmetic, tangent_of
+from lie_codegen.kernels.dual import (
+    DualArithmetic,
+    PlainArithmetic,
+    decimal_arithmetic,
+    fraction_arithmetic,
+    tangent_of,
+)
 from lie_codegen.kernels.error_derivatives import ErrorDerivatives
 from lie_codegen.kernels.exponential_entries import ExponentialEntries
 from lie_codegen.kernels.linear import Matrix, identity, matmul, matvec, plus, transpose
@@ -57,12 +65,13 @@ def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
         residual = _residual(ops, error, real, [(_rational(data, rng), _rational(data, rng)) for _ in range(_POINTS)])
         exact, compatible = True, residual == 0
     except (ArithmeticError, AttributeError, TypeError):
-        ops = mpmath_arithmetic(_DIGITS)
+        ops = decimal_arithmetic(_DIGITS)
         points = [(_element(ops, data, rng), _element(ops, data, rng)) for _ in range(_POINTS)]
         residual = _residual(ops, error, real, points)
         exact, compatible = False, residual < ops.constant(_TOLERANCE)
-    hessian = _hessian(mpmath_arithmetic(_DIGITS), error, real)
-    return Compatibility(compatible, exact, float(residual), _positive(error, real, hessian), hessian)
+    hessian = _hessian(ops, error, real)
+    X = _rational(data, rng) if exact else _element(ops, data, rng)
+    return Compatibility(compatible, exact, float(residual), _positive(ops, error, real, X, hessian), hessian)
 
 
 def check_compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
@@ -118,14 +127,11 @@ def _hessian(ops: Arithmetic, error: ErrorFunction, real: RealMatrices) -> tuple
     return tuple(rows)
 
 
-def _positive(error: ErrorFunction, real: RealMatrices, hessian: tuple[tuple[float, ...], ...]) -> bool:
-    import numpy as np
-
-    ops = mpmath_arithmetic(_DIGITS)
-    data = WeiNormanData(error.group)
-    X = _element(ops, data, random.Random(1))
+def _positive(
+    ops: PlainArithmetic, error: ErrorFunction, real: RealMatrices, X: Matrix, hessian: tuple[tuple[float, ...], ...]
+) -> bool:
     phi, gradient = ErrorDerivatives(ops, error, real, X, X).differential(1)
-    zero = all(abs(value) < ops.constant(_TOLERANCE) for value in (phi, *gradient))
+    zero = all(abs(value) <= ops.constant(_TOLERANCE) for value in (phi, *gradient))
     values = np.linalg.eigvalsh((np.array(hessian) + np.array(hessian).T) / 2)
     return bool(zero and values[0] > 1e-12 * max(1e-300, abs(values[-1])))
 

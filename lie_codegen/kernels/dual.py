@@ -200,36 +200,23 @@ class PlainArithmetic:
         return then if condition else otherwise
 
 
-def mpmath_arithmetic(digits: int) -> PlainArithmetic:
-    """mpmath numbers of the given precision."""
-    import mpmath
-
-    context = mpmath.mp.clone()
-    context.dps = digits
+def decimal_arithmetic(digits: int) -> PlainArithmetic:
+    """SymPy floats of the given number of digits."""
+    import sympy as sp
 
     def number(value: Any) -> Any:
-        if hasattr(value, "evalf"):
-            return context.mpf(str(value.evalf(digits + 5)))
+        if isinstance(value, sp.Expr):
+            return value.evalf(digits)
         numerator, denominator = value.as_integer_ratio()
-        return context.mpf(numerator) / denominator
+        return sp.Rational(numerator, denominator).evalf(digits)
 
-    names = (
-        "sin",
-        "cos",
-        "tan",
-        "exp",
-        "expm1",
-        "log",
-        "sqrt",
-        "sinh",
-        "cosh",
-        "tanh",
-        "acos",
-        "asin",
-        "atan",
-        "atan2",
-    )
-    return PlainArithmetic(number, {**{name: getattr(context, name) for name in names}, "fabs": context.fabs})
+    names = ("sin", "cos", "tan", "exp", "log", "sqrt", "sinh", "cosh", "tanh", "acos", "asin", "atan", "atan2")
+    functions: dict[str, Callable[..., Any]] = {name: _rounded(getattr(sp, name), number) for name in names}
+    return PlainArithmetic(number, {**functions, "expm1": lambda x: functions["exp"](x) - 1, "fabs": abs})
+
+
+def _rounded(function: Callable[..., Any], number: Callable[[Any], Any]) -> Callable[..., Any]:
+    return lambda *arguments: number(function(*arguments))
 
 
 def fraction_arithmetic() -> PlainArithmetic:

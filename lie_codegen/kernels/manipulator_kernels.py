@@ -93,7 +93,8 @@ def _read(
     def read(entry: Any) -> sp.Expr:
         if isinstance(entry, str):
             return parse_expression(entry, names, FORMULA_FUNCTIONS)
-        return sp.S(entry).subs({sp.Symbol(key): value for key, value in names.items()})
+        value = entry if isinstance(entry, sp.Expr) else real_number(entry, "inertia")
+        return value.subs({sp.Symbol(key): value for key, value in names.items()})
 
     M = sp.Matrix([[read(entry) for entry in row] for row in inertia])
     if any(sp.simplify(M[i, j] - M[j, i]) != 0 for i in range(n) for j in range(i)):

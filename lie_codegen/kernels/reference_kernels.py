@@ -22,6 +22,7 @@ from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import matrix_port, velocity_units
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.kernels.linear import Matrix, Vector, matvec
+from lie_codegen.kernels.logarithm import log_coordinates
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, product_exp
 
 #: How far a waypoint may lie off the group, relative to its size.
@@ -268,19 +269,34 @@ def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: i
 
 def _logarithm(group: MatrixGroup, X: NDArray[Any]) -> NDArray[Any] | None:
     """The x with exp(hat(x)) = X, or None where the principal logarithm is not in the algebra."""
-    from scipy.linalg import expm, logm
-
-    x: NDArray[Any] = group.project(np.asarray(logm(X)))
-    off = float(np.max(np.abs(expm(group.hat(x)) - X)))
+    derivation, ops = GroupDerivation(group), FloatArithmetic()
+    try:
+        x = np.array(log_coordinates(ops, derivation, _scalars(X)), dtype=float)
+        off = float(np.max(np.abs(_numbers(exp_matrix(ops, derivation, x.tolist())) - X)))
+    except (ArithmeticError, ValueError):
+        return None
+    turn = float(np.max(np.abs(np.linalg.eigvals(group.hat(x)).imag)))
+    if turn > np.pi * (1 - 1e-9):
+        return None  # the other way round is as short
     return x if off <= _ON_GROUP * max(1.0, float(np.max(np.abs(X)))) else None
+
+
+def _scalars(X: NDArray[Any]) -> list[list[Any]]:
+    if np.iscomplexobj(X):
+        return [[Complex(float(z.real), float(z.imag)) for z in row] for row in X]
+    return [[float(x) for x in row] for row in X]
+
+
+def _numbers(X: Sequence[Sequence[Any]]) -> NDArray[Any]:
+    return np.array([[complex(z.re, z.im) if isinstance(z, Complex) else float(z) for z in row] for row in X])
 
 
 def _on_group(group: MatrixGroup, X: NDArray[Any]) -> bool:
     """Whether X is on the group: some element near it has a logarithm in the algebra."""
-    from scipy.linalg import expm
-
+    derivation, ops = GroupDerivation(group), FloatArithmetic()
     for seed in range(3):
-        nudge = expm(group.hat(0.1 * np.random.default_rng(seed).normal(size=group.dim)))
+        small = 0.1 * np.random.default_rng(seed).normal(size=group.dim)
+        nudge = _numbers(exp_matrix(ops, derivation, small.tolist()))
         if _logarithm(group, X @ nudge) is not None:
             return True
     return False

@@ -122,7 +122,7 @@ def accessibility_rank(
         layer = [_field_bracket(algebra, symbols, f, g) for f in (drift, *controls) for g in layer]
         found += layer
         layer = [field for field in layer if any(entry != 0 for entry in (*field[0], *field[1]))]
-    rows = [[sp.S(entry).subs(point) for entry in (*a, *b)] for a, b in found]
+    rows = [[entry.subs(point) for entry in (*a, *b)] for a, b in found]
     return int(domain_matrix(rows).rank())
 
 
@@ -186,7 +186,7 @@ def force_vectors(algebra: LieAlgebra, forces: Sequence[Sequence[sp.Expr] | str]
     result = []
     for force in forces:
         if isinstance(force, str):
-            result.append([sp.S(int(k == algebra.index(force))) for k in range(algebra.dim)])
+            result.append([sp.Integer(int(k == algebra.index(force))) for k in range(algebra.dim)])
             continue
         if len(force) != algebra.dim:
             raise ShapeError(f"a force on {algebra.name} has {algebra.dim} entries, got {len(force)}")

@@ -22,7 +22,7 @@ from lie_codegen.mechanics.euler_poincare import ad_star, bracket
 def connection(algebra: LieAlgebra, inertia: sp.MatrixBase) -> tuple[sp.ImmutableMatrix, ...]:
     """(n) exact matrices G[k] with nabla_{A_i} A_j = sum_k G[k][i, j] A_k."""
     n = algebra.dim
-    units = [[sp.S(int(i == j)) for j in range(n)] for i in range(n)]
+    units = [[sp.Integer(int(i == j)) for j in range(n)] for i in range(n)]
     inverse = inertia.inv()
     table = [[_nabla(algebra, inertia, inverse, units[i], units[j]) for j in range(n)] for i in range(n)]
     return tuple(sp.ImmutableMatrix(n, n, lambda i, j, k=k: table[i][j][k]) for k in range(n))
