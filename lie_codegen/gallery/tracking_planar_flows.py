@@ -38,7 +38,8 @@ def tracking_planar_flows(folder: Path, progress: Callable[[str], None] = quiet)
         for path in np.moveaxis(flow, 1, 0):
             axes.plot(path[:, 0, 2], path[:, 1, 2], color=BLUE, lw=0.9)
             for X in path[:: _STEPS // 10]:
-                _frame(axes, X)
+                if np.hypot(X[0, 2], X[1, 2]) > 0.3:  # near the end they would hide each other
+                    _frame(axes, X)
         axes.set(title=title, aspect="equal", xlim=(-1.9, 1.9), ylim=(-1.9, 1.9))
         axes.axis("off")
         numbers[f"phi_{row}_left"] = float(np.max(phi))
