@@ -164,6 +164,11 @@ def test_two_cyclic_coordinates_at_once():
     assert planar.cyclic == ("x", "phi")
     reduced = routh_reduce(planar, momentum={"x": "px", "phi": 3})
     assert reduced.system.parameters == ("px",)
+    valued = lagrangian_system(
+        coordinates=("r", "x"), lagrangian="dr^2/2 + dx^2/2 + r*dx*dr - k*r^4", parameters={"k": 2, "p": "1/3"}
+    )
+    assert routh_reduce(valued, momentum={"x": "3*p*k"}).momenta == (2,)
+    assert routh_reduce(valued, momentum={"x": "3*p*k"}).system.parameters == ()
     r = reduced.system.q[0]
     assert sp.simplify(reduced.amended_potential - (r**4 + sp.Symbol("px", real=True) ** 2 / 2 + 9 / (2 * r**2))) == 0
 

@@ -36,6 +36,7 @@ class LagrangianSystem:
         dissipation: Rayleigh function D(q, v); its force is -dD/dv.
         input_matrix: (n, m) B(q).
         parameters: names that stayed symbols, in order.
+        constants: (name, value) of the parameters that have one.
     """
 
     coordinates: tuple[str, ...]
@@ -47,6 +48,7 @@ class LagrangianSystem:
     dissipation: sp.Expr
     input_matrix: sp.ImmutableMatrix
     parameters: tuple[str, ...] = ()
+    constants: tuple[tuple[str, sp.Expr], ...] = ()
 
     @cached_property
     def q(self) -> tuple[sp.Symbol, ...]:
@@ -160,7 +162,8 @@ def lagrangian_system(
     matrix, rest = _affine(applied, list(symbols.values()), names)
     velocities = [sp.Symbol(f"d{name}", real=True) for name in names]
     free = tuple(name for name, value in values.items() if value.is_Symbol)
-    return system_from(names, control, energy, rest, rayleigh, matrix, velocities, free)
+    constants = tuple((name, value) for name, value in values.items() if not value.is_Symbol)
+    return system_from(names, control, energy, rest, rayleigh, matrix, velocities, free, constants)
 
 
 def system_from(
@@ -172,6 +175,7 @@ def system_from(
     input_matrix: sp.ImmutableMatrix,
     velocities: Sequence[sp.Symbol],
     parameters: tuple[str, ...],
+    constants: tuple[tuple[str, sp.Expr], ...] = (),
 ) -> LagrangianSystem:
     """The system of an exact Lagrangian; checks that it is mechanical.
 
@@ -193,7 +197,7 @@ def system_from(
         raise InputError(f"the mass matrix is singular: no kinetic energy along ({null}) in {', '.join(coordinates)}")
     return LagrangianSystem(
         coordinates, inputs, lagrangian, sp.ImmutableMatrix(mass), sp.ImmutableMatrix(gyroscopic),
-        sp.ImmutableMatrix(force), dissipation, sp.ImmutableMatrix(input_matrix), parameters,
+        sp.ImmutableMatrix(force), dissipation, sp.ImmutableMatrix(input_matrix), parameters, constants,
     )  # fmt: skip
 
 

@@ -65,8 +65,8 @@ def routh_reduce(system: LagrangianSystem, *, momentum: Mapping[str, Any]) -> Ro
 
     Args:
         system: of `lagrangian_system`.
-        momentum: cyclic coordinate -> its conserved momentum: a number, or a formula whose unknown names become
-            parameters of the reduced system.
+        momentum: cyclic coordinate -> its conserved momentum: a number, or a formula in the system's parameters whose
+            unknown names become parameters of the reduced system.
 
     Raises:
         InputError: a coordinate that is not cyclic (with the reason), all coordinates, or a name that is taken.
@@ -101,6 +101,7 @@ def routh_reduce(system: LagrangianSystem, *, momentum: Mapping[str, Any]) -> Ro
         system.input_matrix.extract(kept, list(range(len(system.inputs)))),
         list(velocities),
         parameters,
+        system.constants,
     )
     return RouthReduction(
         system, reduced, tuple(momentum), tuple(values), sp.ImmutableMatrix(connection), reduced.potential,
@@ -116,9 +117,9 @@ def _momenta(system: LagrangianSystem, momentum: Mapping[str, Any]) -> tuple[tup
         for other in names_in(value):
             if other in taken:
                 raise InputError(f"momentum of {name}: {other!r} is the name of something that varies")
-            if other not in parameters and other != "pi":
+            if other not in parameters and other not in dict(system.constants) and other != "pi":
                 parameters.append(check_identifier(other, "momentum"))
-        known = {p: sp.Symbol(p, real=True) for p in parameters}
+        known = {**dict(system.constants), **{p: sp.Symbol(p, real=True) for p in parameters}}
         values.append(formula(value, known, f"momentum of {name}"))
     return tuple(parameters), values
 

@@ -31,9 +31,17 @@ def symmetric_product(first: Field, second: Field, drift: Field, state: Sequence
     return lie_bracket(first, lie_bracket(drift, second, state), state)
 
 
+#: Operations beyond which an expression is kept as it was derived: factoring grows faster than code does.
+LARGEST_TIDIED = 800
+
+
 def tidy(expression: sp.Expr) -> sp.Expr:
-    """One fraction in lowest terms, factored, with cos^2 written 1 - sin^2 (and cosh^2 as 1 + sinh^2)."""
-    if expression.is_Number or expression.is_Symbol:
+    """One fraction in lowest terms, factored, with cos^2 written 1 - sin^2 (and cosh^2 as 1 + sinh^2).
+
+    Expressions of more than LARGEST_TIDIED operations stay as they are: exact, and shared subexpressions are computed
+    once in code.
+    """
+    if expression.is_Number or expression.is_Symbol or sp.count_ops(expression) > LARGEST_TIDIED:
         return expression
     numerator, denominator = sp.fraction(sp.together(expression))
     return sp.factor(_without_squares(numerator) / _without_squares(denominator))
