@@ -33,4 +33,6 @@ class Defaults:
             return Defaults(16, 16, 16)
         if depth <= 1:
             return Defaults(192, 16, 16)
-        return Defaults(256, 24, 40)
+        if depth == 2:
+            return Defaults(256, 24, 40)
+        return Defaults(512, 32, 100)

@@ -69,6 +69,7 @@ class SteeringView:
     cosines: tuple[str, ...]
     quiet_rounds: int
     is_deep: bool
+    wave_size: str
     wave_power: str
     kernels: tuple[LaneKernel, ...]
     defaults: Defaults
@@ -95,6 +96,7 @@ def steering_view(group: MatrixGroup, controls: tuple[int, ...], depth: int) -> 
         second=tuple(b for _, b in pairs),
         areas=tuple(tuple(c_literal(float(value)) for value in row) for row in areas),
         cosines=tuple(c_literal(math.cos(math.pi * k / _SEED_STEPS)) for k in range(2 * _SEED_STEPS)),
+        wave_size=c_literal(0.5 * depth if depth > 1 else 0.5),
         wave_power=c_literal(0.5 / (depth + 1)),
         is_deep=depth > 1,
         quiet_rounds=1 if depth <= 1 else 0,

@@ -37,6 +37,16 @@ TARGETS = (
     ),
     Target("averaging_orders", "leonard_orders", "every form of average, its order measured; the erratum of (45)-(46)"),
     Target("averaging_growth", "leonard_growth", "what exact averages cost, against order and harmonics"),
+    Target(
+        "steering_star_tracker",
+        "steering_star_tracker",
+        "two wheels, bounded rates, a cone kept out of: optimal steering under constraints",
+    ),
+    Target(
+        "hessian_errors",
+        "hessian_errors",
+        "accuracy near the identity: exp and log with two derivatives, ours and the neighbours'",
+    ),
     Target("attitude_trajectory", "attitude_trajectory", "Geyer, Figure 1: the second-order attitude law"),
     Target("attitude_region", "attitude_region", "10^4 initial states of the satellite law beside the proved region"),
     Target(
