@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import typer
 
-from lie_codegen.cli import averages, code, groups, motion
+from lie_codegen.cli import averages, bench, code, groups, motion
 from lie_codegen.cli.output import complain
 from lie_codegen.errors import InputError, LieCodegenError
 
@@ -20,7 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _part in (groups.commands, code.commands, motion.commands, averages.commands):
+for _part in (groups.commands, code.commands, motion.commands, averages.commands, bench.commands):
     for _command in _part:
         app.command()(_command)
 

@@ -15,6 +15,7 @@ from lie_codegen.cli.output import emit
 def generate(
     group: GroupName,
     out: Annotated[Path | None, typer.Option(help="Folder to write; ./GROUP by default.")] = None,
+    real: Annotated[str, typer.Option(help="double, or float for processors without double.")] = "double",
     json: Json = False,
 ) -> None:
     """Generate the C package of a group: header, source, CMake, example, test vectors."""
@@ -23,7 +24,7 @@ def generate(
 
     started = time.perf_counter()
     g = load(group)
-    folder = write(g, out or Path(g.name))
+    folder = write(g, out or Path(g.name), real=real)
     seconds = time.perf_counter() - started
     files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
     text = f"wrote {folder} in {seconds:.2f} s: {', '.join(files)}"

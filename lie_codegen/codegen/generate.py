@@ -19,6 +19,7 @@ def generate(
     namespace: str,
     metadata: PackageMetadata | Mapping[str, Any] | None = None,
     extra: Mapping[str, str] | None = None,
+    real: str = "double",
 ) -> Path:
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
@@ -28,13 +29,14 @@ def generate(
         namespace: prefix of every symbol, and the name of the header and the CMake target.
         metadata: what the documentation says about the group: `PackageMetadata` or a mapping of its fields.
         extra: further files of the package, {path: text}.
+        real: "double", or "float" for processors that have no double; the formulas are the same.
 
     Raises:
-        CodegenError: a kernel cannot become C, or two symbols collide.
+        CodegenError: a kernel cannot become C, two symbols collide, or a constant is beyond the range of float.
         IdentifierError: the namespace is no C identifier.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    return write_package(render_package(namespace, kernels, _metadata(metadata), extra), folder)
+    return write_package(render_package(namespace, kernels, _metadata(metadata), extra, real), folder)
 
 
 def _metadata(given: PackageMetadata | Mapping[str, Any] | None) -> PackageMetadata:

@@ -10,6 +10,8 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from lie_codegen.errors import CodegenError
 
 #: Operation -> C expression over double operands {0}, {1}, {2}. Every result is a double.
@@ -67,11 +69,19 @@ C99_FORMS: Mapping[str, str] = {
     "SELECT": "{0} != 0.0 ? {1} : {2}",
 }
 
+_LEAST_FLOAT, _MOST_FLOAT = 1.1754943508222875e-38, 3.4028234663852886e38
+
 #: Macros a C parameter would be replaced by, in C or in the GNU dialects.
 _MACROS = ("HUGE_VAL", "NAN", "INFINITY", "NULL", "I", "errno", "assert", "complex", "imaginary", "unix", "linux")
 
-#: Names that no C parameter may have: the functions that the forms call, and macros.
-RESERVED = frozenset(re.findall(r"[a-z]\w*(?=\()", " ".join(C99_FORMS.values()))) | frozenset(_MACROS)
+_FUNCTIONS = frozenset(re.findall(r"[a-z]\w*(?=\()", " ".join(C99_FORMS.values())))
+#: Names that no C parameter may have: the functions that the forms call, in double and in float, and macros.
+RESERVED = _FUNCTIONS | frozenset(f"{name}f" for name in _FUNCTIONS) | frozenset(_MACROS)
+#: The same in single precision: sinf for sin, 1.0f for 1.0.
+C99_FLOAT_FORMS: Mapping[str, str] = {
+    op: re.sub(r"([a-z]\w*)\(", r"\1f(", re.sub(r"(\d\.\d)", r"\1f", form)).replace("(double)", "(float)")
+    for op, form in C99_FORMS.items()
+}
 
 
 def c_literal(value: float) -> str:
@@ -82,6 +92,27 @@ def c_literal(value: float) -> str:
         return "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
     text = repr(float(value))
     return f"({text})" if text.startswith("-") else text
+
+
+def c_float_literal(value: float) -> str:
+    """The shortest decimal that reads back as the float nearest to `value`.
+
+    What is smaller than every normal float becomes the least of them, not zero: such constants guard divisions, or end
+    a series.
+
+    Raises:
+        CodegenError: it is too large for a float.
+    """
+    if math.isnan(value):
+        return "(float)NAN"
+    if math.isinf(value):
+        return "HUGE_VALF" if value > 0 else "(-HUGE_VALF)"
+    if value != 0.0 and abs(value) < _LEAST_FLOAT:
+        value = math.copysign(_LEAST_FLOAT, value)
+    if abs(value) > _MOST_FLOAT:
+        raise CodegenError(f"the constant {value!r} is no number in single precision: generate with real='double'")
+    text = repr(float(str(np.float32(value))))
+    return f"({text}f)" if text.startswith("-") else f"{text}f"
 
 
 @dataclass(frozen=True)
@@ -116,3 +147,7 @@ class Target:
 
 #: Plain C99 with libm.
 C99 = Target("double", C99_FORMS, c_literal)
+#: The same in single precision, for processors without double.
+C99_FLOAT = Target("float", C99_FLOAT_FORMS, c_float_literal)
+#: The name of a real type -> target.
+REALS: Mapping[str, Target] = {"double": C99, "float": C99_FLOAT}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.codegen.lanes import lane_body, lanes_header
-from lie_codegen.codegen.opcodes import c_literal
+from lie_codegen.codegen.opcodes import REALS, Target
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.tape import tape_of
 from lie_codegen.codegen.templates import render
@@ -21,7 +21,7 @@ from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernels.kernel import Kernel
 
 #: What example.c allows between its results and the vectors, relative to max(1, |expected|).
-TOLERANCE = 1e-11
+TOLERANCES = {"double": 1e-11, "float": 1e-5}
 
 
 @dataclass(frozen=True)
@@ -66,21 +66,27 @@ def render_package(
     kernels: Sequence[Kernel],
     metadata: PackageMetadata | None = None,
     extra: Mapping[str, str] | None = None,
+    real: str = "double",
 ) -> dict[str, str]:
-    """The package as {path: text}, with `extra` files of the same form; writes nothing.
+    """The package as {path: text}, in double or float, with `extra` files of the same form; writes nothing.
 
     Raises:
         CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
     """
-    view = _view(namespace, kernels, metadata or PackageMetadata())
-    vectors = [make_vectors(kernel) for kernel in kernels]
-    checks = [(shown, _rows(kernel, each)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)]
+    if real not in REALS:
+        raise CodegenError(f"real is one of {', '.join(REALS)}, given {real!r}")
+    target = REALS[real]
+    view = _view(namespace, kernels, metadata or PackageMetadata(), target)
+    vectors = [make_vectors(kernel, real=real) for kernel in kernels]
+    checks = [
+        (shown, _rows(kernel, each, target)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)
+    ]
     tree = {
         f"include/{namespace}.h": render("header.h.jinja", package=view),
         f"src/{namespace}.c": render("source.c.jinja", package=view),
         "CMakeLists.txt": render("CMakeLists.txt.jinja", package=view),
         f"{namespace}Config.cmake.in": render("Config.cmake.in.jinja", package=view),
-        "example.c": render("example.c.jinja", package=view, checks=checks, tolerance=repr(TOLERANCE)),
+        "example.c": render("example.c.jinja", package=view, checks=checks, tolerance=repr(TOLERANCES[real])),
         "test_vectors.csv": render("test_vectors.csv.jinja", rows=_csv_rows(kernels, vectors)),
         "README.md": render("README.md.jinja", package=view),
         **(extra or {}),
@@ -124,10 +130,10 @@ def _check(namespace: str, kernels: Sequence[Kernel]) -> None:
     _check_symbols(namespace, kernels)
 
 
-def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata) -> PackageView:
+def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata, target: Target) -> PackageView:
     _check(namespace, kernels)
     tapes = [tape_of(kernel) for kernel in kernels]
-    return package_view(namespace, kernels, tapes, metadata)
+    return package_view(namespace, kernels, tapes, metadata, target)
 
 
 def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
@@ -148,9 +154,9 @@ def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
             owner[symbol] = kernel.symbol
 
 
-def _rows(kernel: Kernel, vectors: Sequence[TestVector]) -> _Rows:
+def _rows(kernel: Kernel, vectors: Sequence[TestVector], target: Target) -> _Rows:
     def literals(part: str, number: int) -> tuple[tuple[str, ...], ...]:
-        return tuple(tuple(c_literal(entry) for entry in getattr(vector, part)[number]) for vector in vectors)
+        return tuple(tuple(target.literal(entry) for entry in getattr(vector, part)[number]) for vector in vectors)
 
     return _Rows(
         count=len(vectors),
@@ -175,6 +181,7 @@ def _manifest(view: PackageView, kernels: Sequence[Kernel], tree: Mapping[str, s
         "format": 1,
         "namespace": view.namespace,
         "version": view.version,
+        **({"real": view.type_name} if view.type_name != "double" else {}),
         "functions": [Signature.of(kernel).to_json() for kernel in kernels],
         "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
     }

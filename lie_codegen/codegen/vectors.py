@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from lie_codegen.errors import CodegenError
 from lie_codegen.kernels.kernel import Kernel
@@ -22,8 +25,8 @@ class TestVector:
     outputs: tuple[tuple[float, ...], ...]
 
 
-def make_vectors(kernel: Kernel, count: int = COUNT) -> tuple[TestVector, ...]:
-    """`count` vectors, seeded by the kernel's symbol alone.
+def make_vectors(kernel: Kernel, count: int = COUNT, real: str = "double") -> tuple[TestVector, ...]:
+    """`count` vectors, seeded by the kernel's symbol alone; for real = "float" the inputs are floats.
 
     Raises:
         CodegenError: the sampler gives a wrong shape, or a sample has no finite answer.
@@ -31,12 +34,13 @@ def make_vectors(kernel: Kernel, count: int = COUNT) -> tuple[TestVector, ...]:
     from lie_codegen.lowering.casadi_arithmetic import flatten, function_of
 
     function = function_of(kernel)
+    rounded: Callable[[float], float] = _as_float if real == "float" else float
     rng = random.Random(kernel.symbol)  # a string seed does not depend on PYTHONHASHSEED
     vectors = []
     for _ in range(count):
         sample = kernel.sample(rng)
         inputs = tuple(
-            tuple(float(entry) for entry in flatten(port, value))
+            tuple(rounded(float(entry)) for entry in flatten(port, value))
             for port, value in zip(kernel.inputs, sample, strict=True)
         )
         for port, values in zip(kernel.inputs, inputs, strict=True):
@@ -48,3 +52,7 @@ def make_vectors(kernel: Kernel, count: int = COUNT) -> tuple[TestVector, ...]:
             raise CodegenError(f"kernel {kernel.symbol} is not finite at its own sample {inputs}: mend the sampler")
         vectors.append(TestVector(inputs, outputs))
     return tuple(vectors)
+
+
+def _as_float(entry: float) -> float:
+    return float(np.float32(entry))

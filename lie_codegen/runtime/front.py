@@ -38,7 +38,11 @@ def build(what: Buildable) -> Library:
 
 
 def generate(
-    what: Buildable, folder: str | Path, *, steering: Sequence[str | int] | Literal[True] | None = None
+    what: Buildable,
+    folder: str | Path,
+    *,
+    steering: Sequence[str | int] | Literal[True] | None = None,
+    real: str = "double",
 ) -> Path:
     """The C package of a group or of kernels, written as a folder; returns its path.
 
@@ -46,7 +50,8 @@ def generate(
         what: as `build`.
         folder: created if need be.
         steering: controls of a group, for a minimum-energy steering solver in the subfolder "steering", a C package by
-            itself with its own example and test vectors; True for all components.
+            itself with its own example and test vectors; True for all components. The solver is in double.
+        real: "double", or "float" for processors without double: arguments, constants and libm in single precision.
 
     Raises:
         InputError: as `build`; steering of kernels.
@@ -64,10 +69,10 @@ def generate(
     if group is None:
         if steering is not None:
             raise InputError("generate: steering needs a group, not kernels")
-        return generate_package(kernels, folder, namespace=_namespace(kernels))
+        return generate_package(kernels, folder, namespace=_namespace(kernels), real=real)
     extra = _steering(group, steering) if steering is not None else {}
     metadata = PackageMetadata(title=group.name, description=_about(group), labels=group.labels, units=group.units)
-    return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata, extra=extra)
+    return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata, extra=extra, real=real)
 
 
 def _steering(group: MatrixGroup, controls: Sequence[str | int] | Literal[True]) -> dict[str, str]:

@@ -1,0 +1,46 @@
+"""lie-codegen bench: ours against the peers that are installed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lie_codegen.cli.groups import Json
+from lie_codegen.cli.output import emit, progress
+
+if TYPE_CHECKING:
+    from lie_codegen.studies.bench import Bench
+
+
+def bench(
+    rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15, json: Json = False
+) -> None:
+    """Time calls, batches, trajectories and cold starts against numba, jax, CasADi, numpy, ...; ratios to ours."""
+    from lie_codegen.studies.bench import bench as measure
+
+    with progress("bench") as report:
+        result = measure(rounds, report)
+    emit(_text(result), asdict(result), json)
+
+
+def _text(result: Bench) -> str:
+    lines = [
+        result.machine,
+        f"one core reads {result.limits.read / 1e9:.1f} GB/s and does {result.limits.operations / 1e9:.1f} GFLOP/s",
+        "ratios to lie_codegen within a round: min / median / max",
+    ]
+    for row in result.rows:
+        lines += ["", f"{row.area}: {row.what}, {row.unit}" + (f" ({row.note})" if row.note else "")]
+        for name, timing in row.timings.items():
+            ratio = timing.ratio
+            lines.append(
+                f"  {name:32} {timing.nanoseconds.middle:12.1f}   {ratio.low:9.2f} /{ratio.middle:9.2f} /{ratio.high:9.2f}"
+            )
+    lines += ["", "cold start of a process to its first so3 exp, seconds (min / median / max)"]
+    lines += [f"  {name:6} {s.low:.2f} / {s.middle:.2f} / {s.high:.2f}" for name, s in result.cold_start.items()]
+    return "\n".join(lines)
+
+
+commands = (bench,)
