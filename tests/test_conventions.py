@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.spatial.transform
 from kernel_calls import call, load
 from scipy.spatial.transform import Rotation
 
@@ -51,6 +52,16 @@ def test_exp_and_log_of_so3_and_su2_against_scipy() -> None:
         x, y, z, s = R.as_quat()
         X = np.array([[s - 1j * z, -y - 1j * x], [y - 1j * x, s + 1j * z]])
         np.testing.assert_allclose(call("su2", "exp", w), X * np.sign(s), atol=5e-16)
+
+
+def test_the_se3_order_of_scipy() -> None:
+    transform = getattr(scipy.spatial.transform, "RigidTransform", None)
+    if transform is None:
+        pytest.skip("this SciPy has no RigidTransform")
+    for x in vectors(6):
+        X = transform.from_exp_coords(tangent_to("scipy", load("se3"), x))
+        np.testing.assert_allclose(call("se3", "exp", x), X.as_matrix(), atol=1e-12)
+        np.testing.assert_allclose(tangent_from("scipy", load("se3"), X.as_exp_coords()), x, atol=1e-12)
 
 
 def test_tangents_go_there_and_back() -> None:

@@ -25,6 +25,7 @@ ALLOWED = {
     "jinja2": {"codegen"},
     "scipy": {"control", "simulation", "steering", "studies", "gallery"},
     "dask": {"studies"},
+    "mpmath": {"studies"},
     "matplotlib": {"gallery", "plots"},
     "typer": {"cli"},
     "rich": {"cli"},
