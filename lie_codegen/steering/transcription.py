@@ -31,6 +31,7 @@ from lie_codegen.steering.transcription_problem import Program, Structure, progr
 Array = NDArray[Any]
 
 _ROUNDS = 5
+_FALLBACK = 4
 _FINE = 8
 _FEASIBLE = 1e-7
 _CLEAR = 1e-8
@@ -117,8 +118,8 @@ def least_energy(
 ) -> Plan:
     """Minimum energy without constraints, where shooting failed."""
     started = time.perf_counter()
-    structure, numbers = _pose(task, None, None, (), (), None, False, "energy", 20.0, weights, 64, 8, "ipopt")
-    return _run(task, structure, numbers, 8, "optimal", tried, progress or (lambda line: None), started)
+    structure, numbers = _pose(task, None, None, (), (), None, False, "energy", 20.0, weights, 64, _FALLBACK, "ipopt")
+    return _run(task, structure, numbers, _FALLBACK, "optimal", tried, progress or (lambda line: None), started)
 
 
 def _pose(

@@ -135,7 +135,7 @@ def _append(constraints: list[Any], equality: list[bool], path: list[tuple[Any, 
 
 
 def _nlpsol(structure: Structure, problem: dict[str, Any], equality: list[bool]) -> Any:
-    common: dict[str, Any] = {"print_time": False, "error_on_fail": False}
+    common: dict[str, Any] = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
     if structure.solver == "fatrop":
         options: dict[str, Any] = {"print_level": 0, "tol": 1e-8, "max_iter": 500}
         own: dict[str, Any] = {"structure_detection": "auto", "equality": equality, "fatrop": options}
@@ -146,7 +146,7 @@ def _nlpsol(structure: Structure, problem: dict[str, Any], equality: list[bool])
         "max_iter": 500,
         "tol": 1e-10,
         "mu_init": 1e-3,
-        "max_wall_time": 60.0,
+        "max_wall_time": 30.0,
         "bound_relax_factor": 0.0,
     }
     return ca.nlpsol("steer", "ipopt", problem, {**common, "ipopt": settings})
