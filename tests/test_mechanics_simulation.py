@@ -12,10 +12,12 @@ from lie_codegen.errors import ComputationError, InputError, NotOnGroupError, Sh
 from lie_codegen.groups.catalogue_load import group as load
 from lie_codegen.kernels.attitude_kernels import attitude_law
 from lie_codegen.kernels.mechanics_kernels import spatial_momentum_kernel
-from lie_codegen.kernels.reference_kernels import check_reference, reference_kernel, waypoint_reference
+from lie_codegen.kernels.reference_check import check_reference
+from lie_codegen.kernels.reference_kernels import reference_kernel
 from lie_codegen.kernels.second_order_step import second_order_step
 from lie_codegen.kernels.tracking_kernels import tracking_law
 from lie_codegen.kernels.variational_step import variational_step
+from lie_codegen.kernels.waypoints import waypoint_reference
 from lie_codegen.lowering.casadi_arithmetic import function_of
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.simulation.second_order import closed_loop, initial_states, split_states

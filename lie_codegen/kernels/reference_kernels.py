@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.control.reference import TIME, FormulaReference, Reference, WaypointReference, formula_reference
-from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernels.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, product
 from lie_codegen.kernels.complex_scalar import Complex
-from lie_codegen.kernels.dual import Dual, DualArithmetic, tangent_of, value_of
+from lie_codegen.kernels.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernels.exponential_map import exp_matrix, jacobian
 from lie_codegen.kernels.expressions import ExpressionEvaluator
 from lie_codegen.kernels.group_derivation import GroupDerivation
 from lie_codegen.kernels.group_matrices import matrix_port, velocity_units
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.kernels.linear import Matrix, Vector, matvec
-from lie_codegen.kernels.logarithm import log_coordinates
+from lie_codegen.kernels.waypoints import waypoint_reference
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, product_exp
-
-#: How far a waypoint may lie off the group, relative to its size.
-_ON_GROUP = 1e-8
-#: Width, relative to the horizon, at which a change that is still there counts as a jump, and its size.
-_JUMP_WIDTH, _JUMP_SIZE = 1e-9, 1e-5
 
 
 def reference_kernel(reference: Reference, name: str = "reference") -> Kernel:
@@ -98,104 +92,6 @@ class ReferenceBody:
         return X, [value_of(x, dual.level) for x in xi], [tangent_of(x, 0, dual.level) for x in xi]
 
 
-def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLike) -> WaypointReference:
-    """A twice continuously differentiable curve through the waypoints, at rest at both ends.
-
-    At an inner waypoint its velocity is the mean of the constant velocities of the two segments that meet there,
-    weighted by the other's duration, and its acceleration is zero.
-
-    Args:
-        group: the group.
-        times: (k,) increasing [s], k >= 2.
-        waypoints: (k, d, d) elements.
-
-    Raises:
-        ShapeError: the shapes do not fit.
-        InputError: times that do not increase (a jump), or two waypoints whose relative element has no unique
-        logarithm. NotOnGroupError: a waypoint is off the group.
-    """
-    t = np.asarray(times, dtype=float)
-    X = np.asarray(waypoints, dtype=complex if group.is_complex else float)
-    if t.ndim != 1 or len(t) < 2 or X.shape != (len(t), group.degree, group.degree):
-        raise ShapeError(
-            f"waypoints on {group.name}: times {t.shape} and elements {X.shape}; give (k,) and "
-            f"(k, {group.degree}, {group.degree}) with k >= 2"
-        )
-    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(X))):
-        raise InputError("waypoints hold NaN or infinity")
-    bad = np.flatnonzero(np.diff(t) <= 0)
-    if len(bad):
-        raise InputError(
-            f"the reference jumps: waypoint {bad[0] + 2} at t = {t[bad[0] + 1]:g} does not come after waypoint "
-            f"{bad[0] + 1} at t = {t[bad[0]]:g}; times must increase"
-        )
-    moves = np.array([_relative_log(group, X[i], X[i + 1], i) for i in range(len(t) - 1)])
-    spans = np.diff(t)
-    mean = moves / spans[:, None]
-    speed = np.zeros((len(t), group.dim))
-    weight = spans[1:] / (spans[1:] + spans[:-1])
-    speed[1:-1] = weight[:, None] * mean[:-1] + (1 - weight)[:, None] * mean[1:]
-    derivation = GroupDerivation(group)
-    table = [_quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
-    return WaypointReference(group, t, X, np.array(table))
-
-
-def check_reference(
-    reference: Reference, t0: float, t1: float, evaluate: Callable[[float], Any] | None = None, samples: int = 400
-) -> None:
-    """Refuses a reference that jumps, or whose velocity or acceleration does, between t0 and t1.
-
-    Args:
-        reference: what to check.
-        t0: first time.
-        t1: last time.
-        evaluate: t -> (X_d, xi_d, xi_d_dot), as the compiled `reference_kernel` gives it; in Python floats if None.
-        samples: number of intervals of the first look.
-
-    Raises:
-        InputError: it jumps or is not finite; names the time.
-    """
-    body = ReferenceBody(reference)
-    at = evaluate or (lambda t: body(FloatArithmetic(), t))
-    name = reference.group.name
-
-    def value(t: float) -> NDArray[Any]:
-        try:
-            X, xi, rate = at(t)
-        except InputError:
-            raise
-        except (ValueError, ZeroDivisionError, OverflowError):
-            raise InputError(f"the reference on {name} has no finite value at t = {t:.9g}") from None
-        entries = [part for row in X for z in row for part in _parts(z)]
-        result = np.array([float(x) for x in (*entries, *xi, *rate)])
-        if not np.all(np.isfinite(result)):
-            raise InputError(f"the reference on {name} has no finite value at t = {t:.9g}")
-        return result
-
-    grid = np.linspace(t0, t1, samples + 1)
-    values = [value(float(t)) for t in grid]
-    changes = [float(np.max(np.abs(b - a))) for a, b in pairwise(values)]
-    for index in np.argsort(changes)[::-1][:8]:
-        low, high, a, b = float(grid[index]), float(grid[index + 1]), values[index], values[index + 1]
-        while high - low > _JUMP_WIDTH * (t1 - t0):
-            middle = (low + high) / 2
-            c = value(middle)
-            if np.max(np.abs(c - a)) >= np.max(np.abs(b - c)):
-                high, b = middle, c
-            else:
-                low, a = middle, c
-        size = float(np.max(np.abs(b - a)))
-        if size > _JUMP_SIZE * max(1.0, changes[index]):
-            raise InputError(
-                f"the reference on {name}, its velocity or its acceleration jumps by {size:.3g} at t = {low:.9g}; "
-                "tracking needs a twice differentiable reference: smooth it, or give waypoints"
-            )
-
-
-def _parts(z: Any) -> tuple[float, float]:
-    return (z.re, z.im) if isinstance(z, Complex) else (z.real, z.imag)
-
-
 def _variable(dual: DualArithmetic, value: Scalar, rate: Scalar) -> Scalar:
     variable = dual.variable(value, {0: rate})
     return variable if variable.tangent else variable.value
@@ -251,72 +147,6 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
     return [
         [sum((a[i][k] * b[k][j] for k in range(1, size)), a[i][0] * b[0][j]) for j in range(size)] for i in range(size)
     ]
-
-
-def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: int) -> NDArray[Any]:
-    relative = np.linalg.solve(X, Y)
-    x = _logarithm(group, relative)
-    if x is not None:
-        return x
-    for number, element in ((index + 1, X), (index + 2, Y)):
-        if not _on_group(group, element):
-            raise NotOnGroupError(f"waypoint {number} is not on {group.name}, or too far from its identity")
-    raise InputError(
-        f"between waypoints {index + 1} and {index + 2} there is no unique way (their relative element has no "
-        "principal logarithm, as a turn by 180 degrees has none); put a waypoint between them"
-    )
-
-
-def _logarithm(group: MatrixGroup, X: NDArray[Any]) -> NDArray[Any] | None:
-    """The x with exp(hat(x)) = X, or None where the principal logarithm is not in the algebra."""
-    derivation, ops = GroupDerivation(group), FloatArithmetic()
-    try:
-        x = np.array(log_coordinates(ops, derivation, _scalars(X)), dtype=float)
-        off = float(np.max(np.abs(_numbers(exp_matrix(ops, derivation, x.tolist())) - X)))
-    except (ArithmeticError, ValueError):
-        return None
-    turn = float(np.max(np.abs(np.linalg.eigvals(group.hat(x)).imag)))
-    if turn > np.pi * (1 - 1e-9):
-        return None  # the other way round is as short
-    return x if off <= _ON_GROUP * max(1.0, float(np.max(np.abs(X)))) else None
-
-
-def _scalars(X: NDArray[Any]) -> list[list[Any]]:
-    if np.iscomplexobj(X):
-        return [[Complex(float(z.real), float(z.imag)) for z in row] for row in X]
-    return [[float(x) for x in row] for row in X]
-
-
-def _numbers(X: Sequence[Sequence[Any]]) -> NDArray[Any]:
-    return np.array([[complex(z.re, z.im) if isinstance(z, Complex) else float(z) for z in row] for row in X])
-
-
-def _on_group(group: MatrixGroup, X: NDArray[Any]) -> bool:
-    """Whether X is on the group: some element near it has a logarithm in the algebra."""
-    derivation, ops = GroupDerivation(group), FloatArithmetic()
-    for seed in range(3):
-        small = 0.1 * np.random.default_rng(seed).normal(size=group.dim)
-        nudge = _numbers(exp_matrix(ops, derivation, small.tolist()))
-        if _logarithm(group, X @ nudge) is not None:
-            return True
-    return False
-
-
-def _quintic(
-    derivation: GroupDerivation, move: NDArray[Any], first: NDArray[Any], last: NDArray[Any], span: float
-) -> NDArray[Any]:
-    """(6, n): p(0) = 0, p(1) = move, body velocities first and last [1/s] and no body acceleration at either end."""
-    ops = FloatArithmetic()
-    inverse = np.array(jacobian(ops, derivation, [float(x) for x in move], "right", inverse=True), dtype=float)
-    rate = inverse @ last * span
-    dual = DualArithmetic(ops)
-    moving = [dual.variable(float(a), {0: float(b)}) for a, b in zip(move, rate, strict=True)]
-    turning = matvec(jacobian(dual, derivation, moving, "right", inverse=False), [float(r) for r in rate])
-    bend = -inverse @ np.array([float(tangent_of(x)) if isinstance(x, Dual) else 0.0 for x in turning])
-    start = first * span
-    conditions = np.array([[1, 1, 1], [3, 4, 5], [6, 12, 20]], dtype=float)
-    rest = np.linalg.solve(conditions, np.array([move - start, rate - start, bend]))
-    return np.vstack([np.zeros_like(move), start, np.zeros_like(move), rest])
 
 
 def reference(

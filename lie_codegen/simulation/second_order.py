@@ -13,7 +13,8 @@ from lie_codegen.errors import ComputationError, InputError, NotOnGroupError, Sh
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.element_pattern import packed_size, varying_entries
 from lie_codegen.kernels.kernel import Kernel
-from lie_codegen.kernels.reference_kernels import check_reference, reference_kernel
+from lie_codegen.kernels.reference_check import check_reference
+from lie_codegen.kernels.reference_kernels import reference_kernel
 from lie_codegen.kernels.second_order_step import ForceBody, check_loop, second_order_step
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
