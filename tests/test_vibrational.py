@@ -114,11 +114,11 @@ def test_averaged_models_converge_with_their_order(order, slope):
     )
     y0 = np.array([0.2, 0.3, 0.0, -0.1])
     errors = []
-    for eps in EPSILONS:
+    for eps in EPSILONS[:3]:
         periods = round(0.64 / (2 * np.pi * eps))
         t = [0, 2 * np.pi * eps * periods]
         errors.append(np.abs(average.solve(y0, t, eps)[-1] - average.solve_actual(y0, t, eps)[-1]).max())
-    found = slopes(errors)[1:]
+    found = slopes(errors, EPSILONS[:3])[1:]
     assert np.all(np.abs(found - slope) < 0.25), (found, errors)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,19 +53,12 @@ class FreeRigidBody:
 
     def kernels(self) -> tuple[Kernel, ...]:
         """to_slow, from_slow, frequency and constants_of_motion, for lc.build and lc.generate."""
-        model = self.model
-        make = euler_kernels
-        return (
-            make.to_slow(model, NAMESPACE),
-            make.from_slow(model, NAMESPACE),
-            make.frequency(model, NAMESPACE),
-            make.constants_of_motion(model, NAMESPACE),
-        )
+        return _kernels(self.model)
 
-    @cached_property
+    @property
     def library(self) -> Library:
         """The compiled kernels."""
-        return build(self.kernels())
+        return _library(self.model)
 
     def to_slow(self, omega: ArrayLike, tau: ArrayLike = 0.0) -> SlowState:
         """(Omega, k, phi) of angular velocities.
@@ -183,6 +176,21 @@ def free_rigid_body(
     Source: Coppola, The method of averaging for Euler's equations of rigid body motion, (9)-(15), Table 1.
     """
     return FreeRigidBody(principal_body(inertia, axis=axis, signs=signs, rates=rates))
+
+
+def _kernels(model: PrincipalBody) -> tuple[Kernel, ...]:
+    make = euler_kernels
+    return (
+        make.to_slow(model, NAMESPACE),
+        make.from_slow(model, NAMESPACE),
+        make.frequency(model, NAMESPACE),
+        make.constants_of_motion(model, NAMESPACE),
+    )
+
+
+@lru_cache(maxsize=64)
+def _library(model: PrincipalBody) -> Library:
+    return build(_kernels(model))
 
 
 def check_slow(Omega: ArrayLike, k: ArrayLike) -> None:
