@@ -18,7 +18,7 @@ from lie_codegen.gallery.tracking_sphere import tracking_sphere
 
 
 def test_the_tutorial_runs_block_after_block(repository: Path, tmp_path: Path) -> None:
-    text = (repository / "docs" / "tracking.md").read_text()
+    text = (repository / "lie_codegen" / "control" / "README.md").read_text()
     program = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
     (tmp_path / "tutorial.py").write_text(program)
     environment = {**os.environ, "PYTHONPATH": str(repository)}
