@@ -52,7 +52,9 @@ class LieAlgebra:
         self._check_jacobi()
 
     def __hash__(self) -> int:
-        return hash((self.name, self.labels, frozenset((key, frozenset(row.items())) for key, row in self.table.items())))
+        return hash(
+            (self.name, self.labels, frozenset((key, frozenset(row.items())) for key, row in self.table.items()))
+        )
 
     @property
     def dim(self) -> int:

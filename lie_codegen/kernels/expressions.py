@@ -39,7 +39,9 @@ class ExpressionEvaluator:
         if expression.is_number and not expression.free_symbols:
             return int(expression) if expression.is_Integer else self.ops.constant(expression)
         if isinstance(expression, sp.Symbol):
-            raise ExpressionError(f"the symbol {expression} has no value; known: {', '.join(map(str, self._symbols()))}")
+            raise ExpressionError(
+                f"the symbol {expression} has no value; known: {', '.join(map(str, self._symbols()))}"
+            )
         if isinstance(expression, sp.Add):
             return reduce(operator.add, map(self, expression.args))
         if isinstance(expression, sp.Mul):
