@@ -6,7 +6,8 @@ Arrays are C-contiguous, aligned, of double entries (complex ones as pairs); sha
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,6 +16,7 @@ import numpy as np
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.errors import CacheError
 from lie_codegen.runtime.arguments import dtype_of
+from lie_codegen.runtime.lane_library import LaneLibrary
 
 Arrays = Sequence[np.ndarray[Any, Any]]
 
@@ -58,17 +60,27 @@ class _Workspace:
 class CtypesBackend:
     """Functions of a shared library; the interpreter lock is released while they run."""
 
-    def __init__(self, library: ctypes.CDLL, signature: Signature) -> None:
+    def __init__(self, library: ctypes.CDLL, signature: Signature, lanes: LaneLibrary | None = None) -> None:
         void, size = ctypes.c_void_p, ctypes.c_ssize_t
+        self._open_lanes: Callable[[], ctypes.CDLL] = (lambda: library) if lanes is None else lanes.open
         symbol = signature.symbol
         self._signature = signature
         self._idle: list[_Workspace] = []  # pop and append are atomic: no two calls ever share a workspace
         self._call = _function(library, f"{symbol}_call", void, void)
-        self._batch = _function(library, f"{symbol}_batch", size, void, void, void)
-        self._scan = self._scan_batch = None
+        self._scan = None
         if is_step(signature.inputs, signature.outputs):
             self._scan = _function(library, f"{symbol}_scan", size, size, void, void, void)
-            self._scan_batch = _function(library, f"{symbol}_scan_batch", size, size, size, void, void, void, void)
+
+    @cached_property
+    def _batch(self) -> Any:
+        void, size = ctypes.c_void_p, ctypes.c_ssize_t
+        return _function(self._open_lanes(), f"{self._signature.symbol}_batch", size, void, void, void)
+
+    @cached_property
+    def _scan_batch(self) -> Any:
+        void, size = ctypes.c_void_p, ctypes.c_ssize_t
+        symbol = f"{self._signature.symbol}_scan_batch"
+        return _function(self._open_lanes(), symbol, size, size, size, void, void, void, void)
 
     def call(self, inputs: Arrays, outputs: Arrays) -> None:
         try:
@@ -101,7 +113,7 @@ class CtypesBackend:
         strides: Sequence[tuple[int, int]],
         trajectories: np.ndarray[Any, Any],
     ) -> None:
-        if self._scan_batch is None:
+        if self._scan is None:
             raise CacheError("the library has no loop for this kernel")
         lanes, moves = (_strides([pair[side] for pair in strides]) for side in (0, 1))
         self._scan_batch(count, steps, every, _pointers(inputs), lanes, moves, trajectories.ctypes.data)

@@ -7,6 +7,7 @@ C text -> compiler -> shared library -> entry      (cold)
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ from lie_codegen.runtime.compiler import (
     warn_no_compiler,
 )
 from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
+from lie_codegen.runtime.extension import extension
+from lie_codegen.runtime.lane_library import ONE_LANE, LaneLibrary, keep_sources
 from lie_codegen.runtime.library import Library, check_names
 from lie_codegen.runtime.quick import quick
 
@@ -66,12 +69,14 @@ def build_kernels(
             entry = cache.find_request(folder, request)
             if entry is not None and (library := _open_or_none(entry)) is not None:
                 return library
+    beside = threading.Thread(target=extension, daemon=True)  # compiled, if need be, while the kernels are derived
+    beside.start()
     kernels = tuple(make_kernels())
     try:
-        return _compile(folder, namespace, kernels, compilers, requests)
+        return _compile(folder, namespace, kernels, compilers, requests, beside)
     except OSError as error:
         reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
-        return _compile(temporary_folder(reason), namespace, kernels, compilers, requests)
+        return _compile(temporary_folder(reason), namespace, kernels, compilers, requests, beside)
 
 
 def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:
@@ -117,6 +122,7 @@ def _compile(
     kernels: Sequence[Kernel],
     compilers: Sequence[Compiler],
     requests: Sequence[str],
+    beside: threading.Thread,
 ) -> Library:
     from lie_codegen.codegen.package import render_library
 
@@ -148,6 +154,7 @@ def _compile(
                     raise
             failure = failure or error
             continue
+        beside.join()
         library = _open(entry)
         evict(folder, keep=key)
         return library
@@ -161,8 +168,10 @@ def _fill(
         for name, text in sources.files.items():
             (home / name).write_bytes(text.encode())
         output = f"{namespace}{_SUFFIX}"
-        compile_library(compiler, home, sources.main, output, flags)
-        return cache.store_entry(folder, key, home / output, namespace, sources.signatures, sources.notes)
+        compile_library(compiler, home, sources.main, output, (*flags, ONE_LANE))
+        entry = cache.store_entry(folder, key, home / output, namespace, sources.signatures, sources.notes)
+        keep_sources(entry, sources.files, sources.main, flags, compiler)
+        return entry
 
 
 def _open_or_none(entry: cache.Entry) -> Library | None:
@@ -175,11 +184,10 @@ def _open_or_none(entry: cache.Entry) -> Library | None:
 
 def _open(entry: cache.Entry) -> Library:
     shared = load_library(entry.library)
+    lanes = LaneLibrary(entry, shared)
     functions = [
-        quick(Compiled(signature, CtypesBackend(shared, signature), compiled=True), shared, signature)
+        quick(Compiled(signature, CtypesBackend(shared, signature, lanes), compiled=True), shared, lanes, signature)
         for signature in entry.signatures
     ]
-    lanes = int(shared[f"{entry.namespace}_lie_codegen_lanes"]())
     how = "the extension type" if functions and not isinstance(functions[0], Compiled) else "ctypes"
-    log = (f"batches: {lanes} samples at a time", f"calls: through {how}", *entry.notes)
-    return Library(entry.namespace, functions, entry.library, log)
+    return Library(entry.namespace, functions, entry.library, (f"calls: through {how}", *entry.notes), lanes.lanes)

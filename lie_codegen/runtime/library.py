@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from lie_codegen.codegen.signature import Signature
@@ -18,25 +18,37 @@ class Library:
         kernels: names, in order.
         compiled: False where CasADi's interpreter stands in for C.
         path: the shared library, or None.
-        build_log: how it was built: lanes of a batch, operations without a lane form, how calls go.
+        build_log: lanes of a batch, operations without a lane form, how calls go.
     """
 
     namespace: str
     kernels: tuple[str, ...]
     compiled: bool
     path: Path | None
-    build_log: tuple[str, ...]
 
     def __init__(
-        self, namespace: str, functions: Sequence[Compiled], path: Path | None, build_log: Sequence[str] = ()
+        self,
+        namespace: str,
+        functions: Sequence[Compiled],
+        path: Path | None,
+        build_log: Sequence[str] = (),
+        lanes: Callable[[], int] | None = None,
     ) -> None:
         self.namespace = namespace
         self.kernels = tuple(function.name for function in functions)
         self.compiled = path is not None
         self.path = path
-        self.build_log = tuple(build_log)
+        self._notes = tuple(build_log)
+        self._lanes = lanes
         self._functions = {function.name: function for function in functions}
         self.__dict__.update(self._functions)
+
+    @property
+    def build_log(self) -> tuple[str, ...]:
+        """How it was built; asking compiles the lanes, if no batch has yet."""
+        if self._lanes is None:
+            return self._notes
+        return (f"batches: {self._lanes()} samples at a time", *self._notes)
 
     def __getattr__(self, name: str) -> Compiled:
         functions = self.__dict__.get("_functions", {})

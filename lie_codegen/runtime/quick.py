@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import ctypes
-from typing import cast
+from functools import cache, wraps
+from typing import Any, cast
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.kernels.kernel import Port
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.extension import extension
+from lie_codegen.runtime.lane_library import LaneLibrary
 
 _MOST_PORTS = 32
 
 
-def quick(compiled: Compiled, library: ctypes.CDLL, signature: Signature) -> Compiled:
+def quick(compiled: Compiled, library: ctypes.CDLL, lanes: LaneLibrary, signature: Signature) -> Compiled:
     """`compiled` behind a fast path for exact arguments; itself where there is no extension.
 
     What the fast path does not take, and every attribute but `batch`, is that of `compiled`.
@@ -21,9 +23,18 @@ def quick(compiled: Compiled, library: ctypes.CDLL, signature: Signature) -> Com
     module = extension()
     if module is None or len(signature.inputs + signature.outputs) > _MOST_PORTS:
         return compiled
-    call, batch = (_address(library, f"{signature.symbol}_{form}") for form in ("call", "batch"))
     inputs, outputs = _plain(signature.inputs), _plain(signature.outputs)
-    samples = module.function(0, batch, inputs, outputs, compiled.batch, compiled.batch, None, compiled.result_type)
+
+    @cache
+    def batch() -> Any:
+        address = _address(lanes.open(), f"{signature.symbol}_batch")
+        return module.function(0, address, inputs, outputs, compiled.batch, compiled.batch, None, compiled.result_type)
+
+    @wraps(compiled.batch)
+    def samples(*args: Any, **named: Any) -> Any:
+        return batch()(*args, **named)
+
+    call = _address(library, f"{signature.symbol}_call")
     fast = module.function(call, 0, inputs, outputs, compiled, compiled, samples, compiled.result_type)
     return cast(Compiled, fast)
 

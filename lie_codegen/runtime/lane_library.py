@@ -1,0 +1,90 @@
+"""Batches on lanes, compiled when a batch is first asked for.
+
+The lane forms take ten times as long to compile as the scalar functions, and most programs never call a batch. A library is
+therefore compiled first with one lane (a batch is a loop over the scalar function); its sources stay in the cache, and the
+first batch compiles them again for the lanes of this machine. Should that fail, the loops serve.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.errors import CompileError
+from lie_codegen.runtime import cache
+from lie_codegen.runtime.compiler import Compiler, compile_library, find_compilers
+from lie_codegen.runtime.digests import digest
+
+#: What the first compilation defines: lanes of one sample.
+ONE_LANE = "-DLCG_LANES=1"
+_SOURCES = "sources.json"
+
+
+class LaneLibrary:
+    """The library with lanes, opened at first use; safe across threads and processes."""
+
+    def __init__(self, entry: cache.Entry, scalar: ctypes.CDLL) -> None:
+        self._entry = entry
+        self._scalar = scalar
+        self._lock = threading.Lock()
+        self._opened: ctypes.CDLL | None = None
+
+    def open(self) -> ctypes.CDLL:
+        """The library whose batches run on lanes; the one without where lanes cannot be had."""
+        with self._lock:
+            if self._opened is None:
+                try:
+                    self._opened = ctypes.CDLL(str(self._find_or_compile()))
+                except (OSError, CompileError, LookupError, ValueError, TypeError):
+                    self._opened = self._scalar
+            return self._opened
+
+    def lanes(self) -> int:
+        """Samples at a time."""
+        return int(self.open()[f"{self._entry.namespace}_lie_codegen_lanes"]())
+
+    def _find_or_compile(self) -> Path:
+        home = self._entry.library.parent
+        folder = home.parent.parent
+        sources = json.loads((home / _SOURCES).read_text(encoding="utf-8"))
+        if sources["sha256"] != digest(sources["files"]):
+            raise ValueError("the sources of the lanes are damaged")
+        compilers = find_compilers()
+        compiler = next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
+        key = digest(["lanes", home.name, compiler.identity])
+        entry = cache.find_entry(folder, key)
+        if entry is None:
+            with cache.lock(folder, key):
+                entry = cache.find_entry(folder, key) or self._compile(folder, key, sources, compiler)
+        return entry.library
+
+    def _compile(self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler) -> cache.Entry:
+        namespace = self._entry.namespace
+        with cache.scratch(folder) as home:
+            for name, text in sources["files"].items():
+                (home / Path(name).name).write_bytes(text.encode())
+            output = f"{namespace}_lanes.so"
+            compile_library(compiler, home, sources["main"], output, tuple(sources["flags"]))
+            return cache.store_entry(folder, key, home / output, namespace, self._entry.signatures)
+
+
+def keep_sources(
+    entry: cache.Entry, files: Mapping[str, str], main: str, flags: tuple[str, ...], compiler: Compiler
+) -> None:
+    """Leave beside a library what its lanes will be compiled from.
+
+    Raises:
+        OSError: the disk is full or the folder cannot be written.
+    """
+    data = {
+        "files": dict(files),
+        "sha256": digest(dict(files)),
+        "main": main,
+        "flags": list(flags),
+        "compiler": compiler.identity,
+    }
+    cache.write_json(entry.library.parent / _SOURCES, data)
