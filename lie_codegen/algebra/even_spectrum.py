@@ -28,11 +28,14 @@ class EvenSpectrum:
         pairs: r.
         multiplicity: m.
         has_zero: whether zero is an eigenvalue for every x.
+        zero_is_defective: whether A times the product over i < pairs does not vanish: A^2 is needed for the eigenvalue zero,
+            as in se(3), where a screw has a Jordan block.
     """
 
     pairs: int
     multiplicity: int
     has_zero: bool
+    zero_is_defective: bool = False
 
 
 def even_spectrum(matrices: Sequence[sp.MatrixBase], most_pairs: int = 6) -> EvenSpectrum | None:
@@ -42,27 +45,32 @@ def even_spectrum(matrices: Sequence[sp.MatrixBase], most_pairs: int = 6) -> Eve
     if images is None:
         return None
     prime, flat = images
-    squares = [
-        _square_at(flat, size, prime, random_point(random.Random(k), prime, len(matrices))) for k in range(_POINTS)
-    ]
+    points = [_at(flat, size, prime, random_point(random.Random(k), prime, len(matrices))) for k in range(_POINTS)]
+    squares = [(A, _product(A, A, prime)) for A in points]
     for pairs in range(1, min(size // 2, most_pairs) + 1):
         for multiplicity in range(2, size // pairs + 1, 2):
             has_zero = pairs * multiplicity < size
-            if all(_vanishes(B, pairs, multiplicity, has_zero, prime) for B in squares):
-                return EvenSpectrum(pairs, multiplicity, has_zero)
+            products = [_remaining(B, pairs, multiplicity, prime) for _, B in squares]
+            cases = list(zip(squares, products, strict=True))
+            if has_zero and all(_is_zero(_product(total, B, prime)) for (_, B), total in cases):
+                defective = not all(_is_zero(_product(total, A, prime)) for (A, _), total in cases)
+                return EvenSpectrum(pairs, multiplicity, True, defective)
+            if not has_zero and all(_is_zero(total) for total in products):
+                return EvenSpectrum(pairs, multiplicity, False)
     return None
 
 
-def _square_at(flat: list[int], size: int, prime: int, x: list[int]) -> _Rows:
+def _at(flat: list[int], size: int, prime: int, x: list[int]) -> _Rows:
     A = [[0] * size for _ in range(size)]
     for place, value in enumerate(flat):
         if value:
             k, (i, j) = place // size**2, divmod(place % size**2, size)
             A[i][j] = (A[i][j] + x[k] * value) % prime
-    return _product(A, A, prime)
+    return A
 
 
-def _vanishes(B: _Rows, pairs: int, multiplicity: int, has_zero: bool, prime: int) -> bool:
+def _remaining(B: _Rows, pairs: int, multiplicity: int, prime: int) -> _Rows:
+    """The product of (B - mu_i) over i < pairs, with the mu_i that the traces of B would give."""
     powers = [B]
     while len(powers) < pairs:
         powers.append(_product(powers[-1], B, prime))
@@ -75,9 +83,11 @@ def _vanishes(B: _Rows, pairs: int, multiplicity: int, has_zero: bool, prime: in
         total = _product(total, B, prime)
         for i in range(size):
             total[i][i] = (total[i][i] + value) % prime
-    if has_zero:
-        total = _product(total, B, prime)
-    return not any(entry for row in total for entry in row)
+    return total
+
+
+def _is_zero(rows: _Rows) -> bool:
+    return not any(entry for row in rows for entry in row)
 
 
 def newton_coefficients(

@@ -108,8 +108,8 @@ def logarithm(
     S = [scaled(half, row) for row in matadd(X, X_inverse, -1)]
     V = matadd([scaled(half, row) for row in matadd(X, X_inverse)], identity(len(X)), -1)
     if even is not None:
-        # S annihilates the eigenvalue zero, which therefore needs no factor.
-        ring, powers = even_ring(ops, V, EvenSpectrum(even.pairs, even.multiplicity, False), relation)
+        # S annihilates an eigenvalue zero without Jordan blocks, which therefore needs no factor.
+        ring, powers = even_ring(ops, V, EvenSpectrum(even.pairs, even.multiplicity, even.zero_is_defective), relation)
     else:
         ring, powers = _plain_ring(ops, V, traceless=False, real=unitary)
     v = [0, 1] + [0] * (ring.r - 2) if ring.r > 1 else ring.shifted([1])
