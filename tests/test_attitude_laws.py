@@ -228,13 +228,21 @@ def test_logarithm_in_forty_digits_is_the_same_body() -> None:
         ({"kind": "pd", "inertia": [1, 1, -1], "k_d": 1}, "not positive definite"),
         ({"kind": "pd", "inertia": [2, 2, 1], "k_d": -1}, "k_d = -1 must be positive"),
         ({"kind": "pd", "inertia": [2, 2, 1], "k_d": 1, "gyroscopic": "on"}, "choose one of cancel, none, double"),
-        ({"kind": "p", "inertia": [2, 2, 1]}, "takes neither inertia nor k_d"),
+        ({"kind": "p", "inertia": [2, 2, -1]}, "not positive definite"),
+        ({"kind": "reduced", "gyroscopic": "on"}, "choose one of cancel, none, double"),
         ({"kind": "reduced", "z": (0, 0, 0)}, "z is zero"),
     ],
 )
 def test_wrong_input_is_refused(arguments: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         attitude_law(arguments.pop("kind"), **arguments)
+
+
+def test_one_call_serves_all_kinds() -> None:
+    X = Rotation.from_rotvec([0.3, -0.2, 0.4]).as_matrix()
+    for kind, place in (("p", X), ("reduced", X[2])):
+        law = attitude_law(kind, inertia=[3, 2, 2], k_p=4, k_d=6, gyroscopic="cancel")
+        np.testing.assert_array_equal(caller(law)(place)[0], caller(attitude_law(kind, k_p=4))(place)[0])
 
 
 def test_a_legal_metric_of_no_rigid_body_warns_and_a_body_does_not() -> None:

@@ -49,10 +49,11 @@ def attitude_law(
     Args:
         kind: "p", (X) -> (omega, V, V_dot), the law (17); "pd", (X, omega) -> (torque, V, V_dot), the law (18);
             "reduced", (y) -> (omega, V, V_dot), Proposition 22 for a body sensor y = R' z.
-        inertia: [kg m^2], for "pd" alone.
+        inertia: [kg m^2], for "pd"; "p" and "reduced" command a velocity and use none of inertia, k_d, gyroscopic:
+            these are checked and ignored there, so that one call serves all kinds.
         k_p: [1/s] for "p" and "reduced", [N m/rad] for "pd".
-        k_d: [N m s/rad], for "pd" alone.
-        gyroscopic: "cancel", "none" or "double", for "pd" alone.
+        k_d: [N m s/rad], for "pd".
+        gyroscopic: "cancel", "none" or "double", for "pd".
         z: the inertial direction that the sensor of "reduced" sees, of any length.
 
     Raises:
@@ -67,8 +68,11 @@ def attitude_law(
         if inertia is None or k_d is None:
             raise InputError("the attitude law 'pd' needs inertia and k_d")
         return _proportional_derivative(inertia, k_p, k_d, gyroscopic)
-    if inertia is not None or k_d is not None:
-        raise InputError(f"the attitude law {kind!r} commands a velocity: it takes neither inertia nor k_d")
+    if inertia is not None:
+        body_inertia(inertia)
+    if k_d is not None:
+        positive_number(k_d, "k_d")
+    gyroscopic_factor(gyroscopic)
     return _proportional(k_p) if kind == "p" else _reduced(k_p, z)
 
 

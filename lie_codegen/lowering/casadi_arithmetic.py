@@ -53,10 +53,15 @@ def function_of(kernel: Kernel) -> ca.Function:
         ca.densify(ca.vertcat(*[ca.SX(entry) for entry in flatten(port, value)]))
         for port, value in zip(kernel.outputs, results, strict=True)
     ]
-    function = ca.Function(
-        kernel.symbol, symbols, flat, [p.name for p in kernel.inputs], [p.name for p in kernel.outputs], {"cse": True}
+    # CasADi forbids some C identifiers (two underscores in a row); its name for the function never reaches the C
+    return ca.Function(
+        ca.Function.fix_name(kernel.symbol),
+        symbols,
+        flat,
+        [p.name for p in kernel.inputs],
+        [p.name for p in kernel.outputs],
+        {"cse": True},
     )
-    return function
 
 
 def flatten(port: Port, value: Any) -> list[Any]:
