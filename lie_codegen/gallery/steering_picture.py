@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.gallery.result import new_figure
+from lie_codegen.simulation.driven import simulate_driven
 from lie_codegen.simulation.flow import simulate
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 from lie_codegen.steering.plan import Plan
@@ -30,8 +31,7 @@ def draw_plan(plan: Plan, minimum: float | None = None, obstacles: Sequence[Obst
         obstacles: drawn with the path.
     """
     t = np.linspace(0, plan.duration, _SAMPLES)
-    drift = plan.details.get("drift")
-    X = simulate(plan.group, plan.u if drift is None else plan.u.plus(drift), t=t).X
+    X = _motion(plan, t)
     figure = new_figure(11, 8)
     parts = figure.add_gridspec(2, 2)
     _controls(figure.add_subplot(parts[0, 0]), plan, t)
@@ -42,6 +42,14 @@ def draw_plan(plan: Plan, minimum: float | None = None, obstacles: Sequence[Obst
         f"{plan.group.name}: {plan.details.get('winner', plan.method)}, error {plan.error:.1e}", fontsize=12
     )
     return figure
+
+
+def _motion(plan: Plan, t: Array) -> Array:
+    """X of the true system: under torques if the plan's controls are."""
+    inertia, drift = plan.details.get("inertia"), plan.details.get("drift")
+    if inertia is not None:
+        return simulate_driven(plan.group, plan.u, inertia, t=t, xi0=plan.details["start_velocity"]).X
+    return simulate(plan.group, plan.u if drift is None else plan.u.plus(drift), t=t).X
 
 
 def _controls(axes: Any, plan: Plan, t: Array) -> None:

@@ -26,7 +26,8 @@ def plot_plan(plan: Plan, path: str | Path, *, obstacles: Sequence[Obstacle] = (
         OutputFolderError: the file cannot be written.
     """
     minimum = plan.cost if plan.method == "optimal" else None
-    if compare and minimum is None and plan.details.get("drift") is None:
+    same_system = not any(plan.details.get("drift", ())) and "inertia" not in plan.details
+    if compare and minimum is None and same_system:
         minimum = steer(plan.group, plan.target, plan.controls, plan.duration, "optimal").cost
     target = Path(path)
     try:

@@ -44,11 +44,16 @@ def finish(
     solved: Status,
     otherwise: Status,
     drift: Array | None = None,
+    end: Array | None = None,
 ) -> Plan:
-    """Simulates the true system under u, and the drift if there is one, and reports where it ends."""
+    """Simulates the true system under u, and the drift if there is one, and reports where it ends.
+
+    Where u is not a velocity the caller has simulated, and says where the true system ends.
+    """
     started = time.perf_counter()
-    run = simulate(task.group, u if drift is None else u.plus(drift), t=[0.0, task.duration])
-    error = distance(task.group, task.target, run.X[-1])
+    if end is None:
+        end = simulate(task.group, u if drift is None else u.plus(drift), t=[0.0, task.duration]).X[-1]
+    error = distance(task.group, task.target, end)
     return Plan(
         group=task.group,
         target=task.target,
@@ -57,7 +62,7 @@ def finish(
         method=method,
         u=u,
         cost=energy(u, task.duration),
-        X_final=run.X[-1],
+        X_final=end,
         error=error,
         status=solved if error <= task.tolerance else otherwise,
         seconds={**seconds, "simulate": time.perf_counter() - started},

@@ -49,7 +49,7 @@ def steer(
             "area_rule": Fourier controls of least energy within the averaged model, then retuned to hit the target exactly;
             "loops": a straight part and one loop for each bracket, one after the other;
             "optimal": minimum energy, exact extremals;
-            "transcription": bounds, rates, obstacles, drift, via points, minimum time;
+            "transcription": bounds, rates, obstacles, drift, torques, via points, periodic controls, minimum time;
             "feedback": in steps, each planned from the measured state.
         tolerance: endpoint error |log(target^-1 X)| below which the plan counts as solved.
         **options: of the method; see its function.

@@ -3,6 +3,8 @@
 Times are in units of the task's duration. A stage holds X, the controls v and the duration s; over an interval the controls
 are linear, v_{k+1} = v_k + r_k, and the state steps by the fourth-order Magnus method for X' = X hat(drift + v):
     X_{k+1} = X_k exp(Theta),   Theta = h (a + b) / 2 + h^2 / 12 [a, b],   h = s / N.
+To second order v is a wrench on the actuated components, the state is (X, xi) and steps by RKMK4 (`driven_step`):
+    X' = X hat(xi),   J xi' = ad*_xi J xi + v.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernels.driven_step import driven_step
 from lie_codegen.kernels.element_pattern import pack, packed_size, unpack
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.kernels.rkmk import bracket_body, times_taylor_exp
@@ -37,6 +40,8 @@ class Structure:
         via: nodes at which X is given.
         free_time: whether the duration is a variable, and the objective.
         solver: "ipopt" or "fatrop".
+        second_order: whether the controls are torques, the state (X, xi).
+        periodic: whether the controls end as they begin.
     """
 
     group: MatrixGroup
@@ -47,6 +52,8 @@ class Structure:
     via: tuple[int, ...] = ()
     free_time: bool = False
     solver: str = "ipopt"
+    second_order: bool = False
+    periodic: bool = False
 
     @property
     def size(self) -> int:
@@ -54,9 +61,14 @@ class Structure:
         return packed_size(self.group)
 
     @property
+    def state(self) -> int:
+        """Doubles of the state: X, and xi to second order."""
+        return self.size + (self.group.dim if self.second_order else 0)
+
+    @property
     def stage(self) -> int:
         """Variables of a stage without its rates."""
-        return self.size + len(self.controls) + 1
+        return self.state + len(self.controls) + 1
 
 
 @dataclass(frozen=True)
@@ -74,9 +86,10 @@ class Program:
 
 @lru_cache(maxsize=32)
 def program(structure: Structure) -> Program:
-    """The program of a structure. Parameters: target, drift, weights, cones, balls, via elements, rate limits (m)."""
+    """The program of a structure. Parameters: target, drift, weights, cones, balls, via elements, rate limits (m), and to
+    second order the inertia and its inverse."""
     group, m, N = structure.group, len(structure.controls), structure.intervals
-    size, d = structure.size, group.degree
+    size, state, d = structure.size, structure.state, group.degree
     target: Any = ca.SX.sym("target", size)
     drift: Any = ca.SX.sym("drift", group.dim)
     weights: Any = ca.SX.sym("weights", m)
@@ -84,11 +97,12 @@ def program(structure: Structure) -> Program:
     balls: Any = ca.SX.sym("balls", d, structure.balls)
     via: Any = ca.SX.sym("via", size, len(structure.via))
     rates: Any = ca.SX.sym("rates", m)
-    parameters = ca.vertcat(target, drift, weights, ca.vec(cones), ca.vec(balls), ca.vec(via), rates)
-    step, miss = function_of(_step_kernel(structure)), function_of(_miss_kernel(structure))
+    masses: Any = ca.SX.sym("masses", 2 * group.dim**2 if structure.second_order else 0)
+    parameters = ca.vertcat(target, drift, weights, ca.vec(cones), ca.vec(balls), ca.vec(via), rates, masses)
+    step, miss = _step(structure), function_of(_miss_kernel(structure))
     p = ca.MX.sym("p", parameters.numel())
-    split = ca.Function("split", [parameters], [target, drift, weights, cones, balls, via, rates])
-    target, drift, weights, cones, balls, via, rates = split(p)
+    split = ca.Function("split", [parameters], [target, drift, weights, cones, balls, via, rates, masses])
+    target, drift, weights, cones, balls, via, rates, masses = split(p)
     clear = _clearance(structure)
     variables: list[Any] = []
     constraints: list[Any] = []
@@ -98,11 +112,12 @@ def program(structure: Structure) -> Program:
     before = None
     for k in range(N + 1):
         z = ca.MX.sym(f"z{k}", structure.stage)
-        X, v, s = z[:size], z[size : size + m], z[size + m]
+        S, X, v, s = z[:state], z[:size], z[state : state + m], z[state + m]
         variables.append(z)
         if before is not None:
-            X0, v0, s0, r = before
-            constraints.append(ca.vertcat(X - step(X0, v0, v0 + r, drift, s0 / N), v - v0 - r, s - s0))
+            S0, v0, s0, r = before
+            moved = step(S0, v0, v0 + r, masses if structure.second_order else drift, s0 / N)
+            constraints.append(ca.vertcat(S - moved, v - v0 - r, s - s0))
             equality += [True] * structure.stage
             _append(constraints, equality, paths[-1])
         path: list[tuple[Any, bool]] = []
@@ -112,10 +127,12 @@ def program(structure: Structure) -> Program:
             path.append((clear(X, cones, balls), False))
         if k == N:
             path.append((miss(target, X), True))
+            if structure.periodic:
+                path.append((v - variables[0][state : state + m], True))
         else:
             r = ca.MX.sym(f"r{k}", m)
             variables.append(r)
-            before = (X, v, s, r)
+            before = (S, v, s, r)
             b = v + r
             energy = ca.dot(weights, v * v + v * b + b * b) * s / (3 * N)
             objective += s / N + 1e-6 * energy if structure.free_time else energy
@@ -150,6 +167,21 @@ def _nlpsol(structure: Structure, problem: dict[str, Any], equality: list[bool])
         "bound_relax_factor": 0.0,
     }
     return ca.nlpsol("steer", "ipopt", problem, {**common, "ipopt": settings})
+
+
+def _step(structure: Structure) -> Any:
+    """(state, v0, v1, drift or masses, h) -> the next state."""
+    if not structure.second_order:
+        return function_of(_step_kernel(structure))
+    group, m, n = structure.group, len(structure.controls), structure.group.dim
+    S, a, b = (ca.SX.sym(name, size) for name, size in (("S", structure.state), ("a", m), ("b", m)))
+    masses, h = ca.SX.sym("masses", 2 * n * n), ca.SX.sym("h")
+    spread = ca.DM.zeros(n, m)
+    for number, position in enumerate(structure.controls):
+        spread[position, number] = 1
+    forces = [spread @ each for each in (a, (a + b) / 2, b)]
+    moved = function_of(driven_step(group, _EXPONENTIAL_DEGREE))(S, masses[: n * n], masses[n * n :], *forces, h)
+    return ca.Function("driven", [S, a, b, masses, h], [moved])
 
 
 def _step_kernel(structure: Structure) -> Kernel:
