@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from math import prod
+
 import sympy as sp
 from sympy.polys.domains import QQ
 
 from lie_codegen.kernels.trigonometric_ring import Element, TrigonometricRing
 
 _Factor = tuple[Element, list[sp.Expr], int]
-#: Terms above which polynomials over an irrational field are not factored.
-_LONG = 40
+#: Coefficients of the norm (a dense polynomial over Q) above which polynomials over an irrational field are not factored.
+_LARGE = 2000
 
 
 def factors(ring: TrigonometricRing, element: Element) -> tuple[sp.Expr, list[tuple[sp.Expr, int]]]:
@@ -40,8 +42,8 @@ def factors(ring: TrigonometricRing, element: Element) -> tuple[sp.Expr, list[tu
 def _factor_list(ring: TrigonometricRing, element: Element, shown: list[sp.Expr]) -> tuple[sp.Expr, list[_Factor]]:
     """(constant, [(factor, what its generators stand for, multiplicity)]), in double angles where that splits more.
 
-    Over Q where the coefficients allow it up to a constant; factoring over Q(sqrt 3) is far slower and is left out
-    for long polynomials.
+    Over Q where the coefficients allow it up to a constant; factoring over Q(sqrt 3) is far slower, by way of the norm, and
+    is left out where that is large.
     """
     if not element:
         return sp.S.Zero, []
@@ -53,7 +55,7 @@ def _factor_list(ring: TrigonometricRing, element: Element, shown: list[sp.Expr]
             constant, found = rational.factor_list()
             found = [(factor.set_ring(ring.ring), multiplicity) for factor, multiplicity in found]
             constant = sp.Rational(constant.numerator, constant.denominator)
-        elif len(monic) > _LONG:
+        elif prod(ring.domain.mod.degree() * degree + 1 for degree in monic.degrees()) > _LARGE:
             constant, found = sp.S.One, [(monic, 1)]
         else:
             constant, found = monic.factor_list()
