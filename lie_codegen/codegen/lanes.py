@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from lie_codegen.codegen.lane_coefficients import HALF_PI, HALF_PI_PARTS, LOG2_PARTS, POLYNOMIALS
 from lie_codegen.codegen.lane_networks import networks
 from lie_codegen.codegen.opcodes import c_literal
+from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Statement, Tape
 from lie_codegen.codegen.templates import render
 from lie_codegen.errors import CodegenError
@@ -105,12 +106,15 @@ class LaneBody:
     Attributes:
         slow: operations that run lane by lane, sorted.
         read: the input ports that are read.
+        parts: functions before this one if the tape is long; they store in the array `work`, of `work_size` vectors.
     """
 
     statements: tuple[LaneStatement, ...]
     stores: tuple[LaneStore, ...]
     slow: tuple[str, ...]
     read: frozenset[int]
+    parts: tuple[LaneBody, ...] = ()
+    work_size: int = 0
 
 
 @dataclass(frozen=True)
@@ -120,13 +124,31 @@ class _Polynomial:
     error: str
 
 
-def lane_body(tape: Tape) -> LaneBody:
-    """The lane form of a tape.
+def lane_body(tape: Tape, ports: int) -> LaneBody:
+    """The lane form of a tape with so many input ports; a long one in parts.
 
     Raises:
         CodegenError: an operation has none, not even lane by lane.
     """
-    emitter = _Emitter(tape)
+    pieces = split(tape, ports)
+    if pieces is None:
+        return _body(tape)
+    parts = []
+    for part in pieces.parts:
+        body = _body(part.tape, ports)
+        moved = [replace(store, entry=place) for store, place in zip(body.stores, part.places, strict=True)]
+        parts.append(replace(body, stores=tuple(moved)))
+    return replace(
+        _body(pieces.last, ports),
+        slow=tuple(sorted({op for part in parts for op in part.slow})),
+        read=frozenset().union(*(part.read for part in parts)) - {ports},
+        parts=tuple(parts),
+        work_size=pieces.size,
+    )
+
+
+def _body(tape: Tape, work: int = -1) -> LaneBody:
+    emitter = _Emitter(tape, work)
     for index, statement in enumerate(tape.statements):
         emitter.emit(index, statement)
     return LaneBody(
@@ -144,7 +166,8 @@ def lane_body(tape: Tape) -> LaneBody:
 class _Emitter:
     """Names of values, as numbers and as masks."""
 
-    def __init__(self, tape: Tape) -> None:
+    def __init__(self, tape: Tape, work: int) -> None:
+        self._work = work
         self.done: list[LaneStatement] = []
         self._numbers: dict[int, str] = {}
         self._masks: dict[int, str] = {}
@@ -164,7 +187,8 @@ class _Emitter:
         if op == "CONST":
             self._numbers[index] = f"lcg_splat({c_literal(statement.value)})"
         elif op == "INPUT":
-            self._add("lcg_v", index, f"in{statement.slot[0]}[{statement.slot[1]}]")
+            port, entry = statement.slot
+            self._add("lcg_v", index, f"work[{entry}]" if port == self._work else f"in{port}[{entry}]")
         elif op in ("SIN", "COS") and operands in self._paired:
             if operands not in self._pairs:
                 name = self._pairs[operands] = f"p{index}"

@@ -103,7 +103,7 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     _check(namespace, kernels)
     tapes = [tape_of(kernel) for kernel in kernels]
     view = package_view(namespace, kernels, tapes, PackageMetadata())
-    bodies = [lane_body(tape) for tape in tapes]
+    bodies = [lane_body(tape, len(kernel.inputs)) for kernel, tape in zip(kernels, tapes, strict=True)]
     files = {
         f"{namespace}.h": render("header.h.jinja", package=view),
         f"{namespace}.c": render("source.c.jinja", package=view),
@@ -115,7 +115,7 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     return LibrarySources(
         files=files,
         main=f"{namespace}_binding.c",
-        statements=sum(len(kernel.statements) for kernel in view.kernels),
+        statements=sum(len(tape.statements) for tape in tapes),
         signatures=tuple(Signature.of(kernel) for kernel in kernels),
         notes=tuple(
             f"{kernel.name}: batches call libm lane by lane for {', '.join(body.slow)}"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from lie_codegen.codegen.opcodes import C99, RESERVED, Target
 from lie_codegen.codegen.signature import is_step
+from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Tape
 from lie_codegen.kernels.kernel import Kernel, Port
 
@@ -71,8 +72,17 @@ class StoreView:
 
 
 @dataclass(frozen=True)
+class PartView:
+    """One of several C functions that share the work of a long kernel."""
+
+    statements: tuple[StatementView, ...]
+    stores: tuple[StoreView, ...]
+    unused: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class KernelView:
-    """One C function."""
+    """One C function; with `parts` before it if it is long, which fill the array `work` of `work_size` entries."""
 
     name: str
     symbol: str
@@ -84,6 +94,9 @@ class KernelView:
     statements: tuple[StatementView, ...]
     stores: tuple[StoreView, ...]
     is_step: bool
+    parts: tuple[PartView, ...] = ()
+    work: str = ""
+    work_size: int = 0
 
 
 @dataclass(frozen=True)
@@ -121,35 +134,32 @@ def package_view(
         conventions=tuple(line for text in metadata.conventions for line in comment_lines(text)),
         version=metadata.version,
         type_name=target.type_name,
-        kernels=tuple(kernel_view(kernel, tape, target) for kernel, tape in zip(kernels, tapes, strict=True)),
+        kernels=tuple(
+            kernel_view(kernel, tape, target, in_parts=True) for kernel, tape in zip(kernels, tapes, strict=True)
+        ),
     )
 
 
-def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99) -> KernelView:
-    """The view of one kernel."""
+def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: bool = False) -> KernelView:
+    """The view of one kernel; with `in_parts` a long one is cut into functions."""
     parameters = _parameter_names(kernel)
     inputs = tuple(_port_view(port, parameters[port.name], is_input=True) for port in kernel.inputs)
     outputs = tuple(_port_view(port, parameters[port.name], is_input=False) for port in kernel.outputs)
     prefix = _temporary_prefix(parameters.values())
-    values: list[str] = []
-    statements: list[StatementView] = []
-    for index, statement in enumerate(tape.statements):
-        if statement.op == "CONST":
-            values.append(target.literal(statement.value))
-            continue
-        if statement.op == "INPUT":
-            port = inputs[statement.slot[0]]
-            text = port.parameter if port.by_value else target.load.format(port.parameter, statement.slot[1])
-        else:
-            text = target.expression(statement.op, tuple(values[i] for i in statement.operands))
-        values.append(f"{prefix}{index}")
-        statements.append(StatementView(values[-1], text))
-    read = {statement.slot[0] for statement in tape.statements if statement.op == "INPUT"}
-    stores = [
-        StoreView(port.parameter, entry, values[index])
-        for port, entries in zip(outputs, tape.outputs, strict=True)
-        for entry, index in enumerate(entries)
-    ]
+    work = next(name for name in ("w", "work", "w_", "work_", "w__") if name not in parameters.values())
+    names = [None if port.by_value else port.parameter for port in inputs]
+    scalars = [port.parameter for port in inputs]
+    pieces = split(tape, len(inputs)) if in_parts else None
+    last, size = (tape, 0) if pieces is None else (pieces.last, pieces.size)
+    parts = []
+    for part in pieces.parts if pieces is not None else ():
+        statements, values = _printed(part.tape, [*names, work], [*scalars, work], target, prefix)
+        stores = tuple(
+            StoreView(work, place, values[index])
+            for place, index in zip(part.places, part.tape.outputs[0], strict=True)
+        )
+        parts.append(PartView(statements, stores, _unread(inputs, part.tape)))
+    statements, values = _printed(last, [*names, work], [*scalars, work], target, prefix)
     return KernelView(
         name=kernel.name,
         symbol=kernel.symbol,
@@ -157,11 +167,44 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99) -> KernelView:
         source=comment_lines(f"Source: {kernel.source}" if kernel.source else ""),
         inputs=inputs,
         outputs=outputs,
-        unused=tuple(port.parameter for number, port in enumerate(inputs) if number not in read),
-        statements=tuple(statements),
-        stores=tuple(stores),
+        unused=_unread(inputs, tape) if pieces is None else (),
+        statements=statements,
+        stores=tuple(
+            StoreView(port.parameter, entry, values[index])
+            for port, entries in zip(outputs, last.outputs, strict=True)
+            for entry, index in enumerate(entries)
+        ),
         is_step=is_step(kernel.inputs, kernel.outputs),
+        parts=tuple(parts),
+        work=work,
+        work_size=size,
     )
+
+
+def _printed(
+    tape: Tape, arrays: Sequence[str | None], scalars: Sequence[str], target: Target, prefix: str
+) -> tuple[tuple[StatementView, ...], list[str]]:
+    """The statements, and the text of every value; a port without an array is a scalar."""
+    values: list[str] = []
+    statements: list[StatementView] = []
+    for index, statement in enumerate(tape.statements):
+        if statement.op == "CONST":
+            values.append(target.literal(statement.value))
+            continue
+        if statement.op == "INPUT":
+            port, entry = statement.slot
+            array = arrays[port]
+            text = scalars[port] if array is None else target.load.format(array, entry)
+        else:
+            text = target.expression(statement.op, tuple(values[i] for i in statement.operands))
+        values.append(f"{prefix}{index}")
+        statements.append(StatementView(values[-1], text))
+    return tuple(statements), values
+
+
+def _unread(inputs: Sequence[PortView], tape: Tape) -> tuple[str, ...]:
+    read = {statement.slot[0] for statement in tape.statements if statement.op == "INPUT"}
+    return tuple(port.parameter for number, port in enumerate(inputs) if number not in read)
 
 
 def comment_lines(text: str) -> tuple[str, ...]:

@@ -213,8 +213,8 @@ def _batches(kernel: Kernel, function: Any, loop: ctypes.CDLL, folder: Path, cou
     outputs = [np.empty((count, port.size)) for port in kernel.outputs]
     given, strides, to = peers.pointers(flat), peers.sizes([p.size for p in kernel.inputs]), peers.pointers(outputs)
     works: dict[str, peers.Work] = {
-        "lie_codegen": lambda: function.batch(*shaped),
         "lie_codegen, out=": lambda: function.batch(*shaped, out=tuple(made) if several else made),
+        "lie_codegen, new arrays": lambda: function.batch(*shaped),
         "CasADi's C in a loop": lambda: loop.bench_batch(ctypes.c_ssize_t(count), given, strides, to),
     }
     arrays = peers.as_python(kernel, folder, "numpy", scalars=False).point
