@@ -1,7 +1,7 @@
 """What an invariant bilinear form says about the entries of matrices.
 
-If A^T S + S A = 0 for a symmetric S, then (S M)^T = +- S M for every even (odd) function M of A. Where a row of S has a single
-nonzero entry, S_{i s(i)}, that reads M_{a j} = +- (S_{j s(j)} / S_{a s(a)}) M_{s(j) s(a)}: half of the entries follow from
+If A^T S + S A = 0 for a symmetric S, then (S M)^T = +- S M for every even (odd) function M of A. Where the rows i and s(i) of S have a
+single nonzero entry, S_{i s(i)}, that reads M_{a j} = +- (S_{j s(j)} / S_{a s(a)}) M_{s(j) s(a)}: half of the entries follow from
 the others.
 """
 
@@ -24,6 +24,8 @@ def entry_relation(form: sp.MatrixBase) -> Relation:
         places = [(j, value) for j, value in enumerate(row) if value != 0]
         if len(places) == 1:
             single[i] = places[0]
+    # Row s(a) must be single too: M_aj is read off row s(a) of S M.
+    single = {i: (j, value) for i, (j, value) in single.items() if j in single}
     return {
         (a, j): ((single[j][0], single[a][0]), sp.radsimp(single[j][1] / single[a][1])) for a in single for j in single
     }
