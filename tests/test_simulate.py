@@ -113,6 +113,25 @@ def test_restarted_charts_cover_a_long_trajectory(name: str) -> None:
     assert seen >= len(run.t)
 
 
+@pytest.mark.parametrize("name", ["so4", "su3"])
+def test_restarts_at_several_walls_against_expm(name: str) -> None:
+    """A constant velocity: X(t) = exp(t hat(u)), whatever charts it crosses."""
+    group = lc.group(name)
+    u = np.random.default_rng(4).normal(size=group.dim)
+    u *= 1.5 / np.linalg.norm(u)
+    run = lc.simulate(group, list(u), t=np.linspace(0, 6, 25))
+    assert len(run.charts) > 2
+    assert {chart.reason for chart in run.charts[:-1]} <= {"wall", "growth"}
+    for chart in run.charts:
+        np.testing.assert_allclose(chart.origin, expm(chart.start * group.hat(u)), rtol=0, atol=1e-9)
+        for t, g in zip(chart.t, chart.g, strict=True):
+            product = chart.origin
+            for coordinate, matrix in zip(g, group.basis, strict=True):
+                product = product @ expm(coordinate * matrix)
+            np.testing.assert_allclose(product, expm(t * group.hat(u)), rtol=0, atol=1e-9)
+    assert sum(len(chart.t) for chart in run.charts) >= len(run.t)
+
+
 def test_a_global_chart_is_never_restarted() -> None:
     h3 = lc.group("h3")
     run = lc.simulate(h3, lambda t: np.array([np.cos(t), np.sin(t), 0.1]), t=np.linspace(0, 20, 21))
