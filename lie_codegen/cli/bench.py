@@ -15,13 +15,15 @@ if TYPE_CHECKING:
 
 
 def bench(
-    rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15, json: Json = False
+    rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
+    only: Annotated[str, typer.Option(help='Only kernels with this text in "group kernel".')] = "",
+    json: Json = False,
 ) -> None:
     """Time calls, batches, trajectories and cold starts against numba, jax, CasADi, numpy, ...; ratios to ours."""
     from lie_codegen.studies.bench import bench as measure
 
     with progress("bench") as report:
-        result = measure(rounds, report)
+        result = measure(rounds, report, only)
     emit(_text(result), asdict(result), json)
 
 

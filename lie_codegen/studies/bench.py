@@ -80,19 +80,20 @@ class Bench:
     cold_start: dict[str, Spread]
 
 
-def bench(rounds: int = 15, report: Report = lambda line: None) -> Bench:
+def bench(rounds: int = 15, report: Report = lambda line: None, only: str = "") -> Bench:
     """Run every comparison.
 
     Args:
         rounds: of each comparison.
         report: is told what is going on.
+        only: leaves out the kernels without this text in "group kernel" (numba compiles those of su3 for minutes).
     """
     with tempfile.TemporaryDirectory(prefix="lie_codegen-bench-") as name:
         folder = Path(name)
         hand = peers.hand_written(folder)
         bounds = limits(hand)
         rows: list[Row] = []
-        for group, kernel in KERNELS:
+        for group, kernel in (each for each in KERNELS if only in " ".join(each)):
             report(f"{group} {kernel}")
             rows += kernel_rows(group_kernel(load(group), kernel), folder, rounds, bounds)
         report("trajectories")
