@@ -267,5 +267,5 @@ def test_quaternion_input_gives_the_same_command_and_its_order_must_be_named() -
             np.testing.assert_allclose(rotation_from_quaternion(q, order=order), R.as_matrix(), atol=1e-15)
     with pytest.raises(InputError, match="the quaternion order is not given"):
         with_quaternion(law)
-    with pytest.raises(InputError, match="'wxyz'; name it"):
-        rotation_from_quaternion([1, 0, 0, 0], order="wxyz")
+    with pytest.raises(InputError, match="'wzyx'; name it"):
+        rotation_from_quaternion([1, 0, 0, 0], order="wzyx")

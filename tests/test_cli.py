@@ -150,3 +150,21 @@ def test_average_prints_exact_coefficients_and_measures_its_order(cli, tmp_path:
     assert result["exact_F"] == [["0", "0", "0"], ["0", "0", "1/2"], ["1/2", "0", "0"]]
     assert result["check"]["passed"]
     assert cli("average", "so3", "--u", "cos(t)").returncode == 2
+
+
+def test_a_usage_error_is_one_line_that_names_the_help(cli) -> None:
+    for arguments, words in (
+        (("steer", "so3"), "'--target'. See lie-codegen steer --help"),
+        (("nope",), "'nope'. See lie-codegen --help"),
+        (("list", "--out"), "--out"),
+    ):
+        done = cli(*arguments)
+        assert done.returncode == 2
+        assert done.stdout == ""
+        assert done.stderr.count("\n") == 1
+        assert words in done.stderr
+
+
+def test_json_has_no_nan(cli) -> None:
+    done = cli("average", "h3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--order", "3", "--check", "--json")
+    json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))

@@ -236,3 +236,9 @@ def test_an_output_array_may_be_an_input_array(private_cache: None) -> None:
     function(x.ctypes.data, 0.1, 0.01, x.ctypes.data, energy.ctypes.data)
     np.testing.assert_array_equal(x, expected.x_next)
     assert energy[0] == expected.energy
+
+
+def test_names_that_CasADi_forbids_are_names_of_C() -> None:
+    for name in ("a__b", "jac", "x_"):
+        function = function_of(Kernel(name, "g_", (Port("x", ()),), (Port("y", ()),), lambda ops, x: (2 * x,)))
+        assert function(3) == 6

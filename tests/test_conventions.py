@@ -97,6 +97,10 @@ def test_wrong_input_is_refused() -> None:
         rotation_from_quaternion([0, 0, 0, 0], order="wxyz")
     with pytest.raises(ShapeError):
         rotation_from_quaternion([1, 0, 0], order="wxyz")
+    with pytest.raises(InputError, match="order is not given"):
+        rotation_from_quaternion([1, 0, 0, 0])
+    with pytest.raises(InputError, match="not finite"):
+        rotation_from_quaternion([np.inf, 0, 0, 0], order="wxyz")
     with pytest.raises(NotOnGroupError):
         quaternion_from_rotation(np.diag([1.0, 1.0, -1.0]), order="wxyz")
     with pytest.raises(NotOnGroupError):

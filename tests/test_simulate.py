@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
-from lie_codegen.errors import ChartError, InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import ChartError, InputError, NotFiniteError, NotOnGroupError, ShapeError
 
 NAMES = ("so3", "se2", "se3", "su2", "sl2", "h3")
 
@@ -169,3 +169,45 @@ def test_bad_input_is_named(change: dict[str, object], error: type[Exception]) -
     arguments: dict[str, object] = {"u": [1.0, 0.0, 0.0], "t": [0.0, 1.0], **change}
     with pytest.raises(error):
         lc.simulate(lc.group("so3"), arguments.pop("u"), **arguments)
+
+
+@pytest.mark.parametrize("name", ["so3", "se3", "su2", "su3", "sl3", "h3", "so31", "sp4", "osc4", "aff1"])
+def test_a_start_off_the_group_is_refused_and_one_on_it_is_not(name: str) -> None:
+    group, rng = lc.group(name), np.random.default_rng(5)
+    X = np.eye(group.degree)
+    for _ in range(3):
+        X = X @ expm(group.hat(0.4 * rng.normal(size=group.dim)))
+    zero = np.zeros(group.dim)
+    np.testing.assert_array_equal(lc.simulate(group, zero, t=[0, 1], X0=X).X[0], X)
+    for off in (2 * X, X + 1e-5 * rng.normal(size=X.shape), np.zeros_like(X)):
+        with pytest.raises(NotOnGroupError, match="X0 is not on"):
+            lc.simulate(group, zero, t=[0, 1], X0=off)
+
+
+def test_another_component_of_the_orthogonal_group_is_refused() -> None:
+    with pytest.raises(NotOnGroupError, match="determinant"):
+        lc.simulate(lc.group("so3"), np.zeros(3), t=[0, 1], X0=np.diag([1, 1, -1.0]))
+
+
+def test_texts_where_numbers_belong_are_named() -> None:
+    so3 = lc.group("so3")
+    for u, named, words in (
+        (["cos(t)", "0", "0"], {"t": [0, 1]}, "PeriodicInput"),
+        (lambda t: "x", {"t": [0, 1]}, "real numbers"),
+        (np.zeros(3), {"t": "x"}, "array of numbers"),
+        (np.zeros(3), {"t": [0, 1], "eps": "x"}, "eps is 'x'"),
+        (np.zeros(3), {"t": [0, 1], "X0": "x"}, "array of numbers"),
+    ):
+        with pytest.raises(InputError, match=words):
+            lc.simulate(so3, u, **named)
+    for call in (
+        lambda: lc.simulate("so3", np.zeros(3), t=[0, 1]),
+        lambda: lc.average("so3", lc.PeriodicInput(["cos(t)"], period="2*pi")),
+        lambda: lc.steer("so3", np.zeros(3), controls=("w1", "w2"), duration=1),
+        lambda: lc.wei_norman("so3"),
+        lambda: lc.controllability("so3", ("w1",)),
+        lambda: lc.structure("so3"),
+        lambda: lc.tracking_law("so3", inertia=1, error="so3_right"),
+    ):
+        with pytest.raises(InputError, match="expected a group"):
+            call()

@@ -44,7 +44,7 @@ def control_indices(algebra: LieAlgebra, controls: Sequence[str | int]) -> tuple
     Raises:
         InputError: if there is none, one is unknown, or one is repeated.
     """
-    if isinstance(controls, str) or not len(controls):
+    if isinstance(controls, str) or not isinstance(controls, Sequence) or not controls:
         raise InputError(f"{algebra.name}: controls must be a non-empty sequence of labels, got {controls!r}")
     indices = tuple(algebra.index(control) for control in controls)
     if len(set(indices)) < len(indices):

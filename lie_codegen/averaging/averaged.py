@@ -19,7 +19,7 @@ from lie_codegen.averaging.input_formulas import TIME
 from lie_codegen.averaging.nilpotent import nilpotency_step
 from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 
 Array = NDArray[Any]
 
@@ -204,6 +204,7 @@ def average(
         InputError: no such form or order.
         ShapeError: if u has not n components.
     """
+    require_group(group, "average")
     if not isinstance(u, PeriodicInput):
         raise InputError(f"average: u is {type(u).__name__}; make it a PeriodicInput")
     if u.dim != group.dim:
@@ -265,7 +266,10 @@ def _initial(group: MatrixGroup, X0: ArrayLike | None) -> Array:
 
 
 def _finite(value: ArrayLike, name: str, kind: type = float) -> Array:
-    array: Array = np.asarray(value, dtype=kind)
+    try:
+        array: Array = np.asarray(value, dtype=kind)
+    except (TypeError, ValueError):
+        raise InputError(f"average: {name} must be numbers, got {value!r}") from None
     if not np.all(np.isfinite(array)):
         raise NotFiniteError(f"average: {name} holds NaN or infinity")
     return array

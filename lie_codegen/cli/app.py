@@ -25,6 +25,18 @@ for _part in (groups.commands, code.commands, motion.commands, averages.commands
         app.command()(_command)
 
 
+#: click's error of usage, or that of the copy of click that typer brings from version 0.26 on.
+_UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+
+
+def _one_line(error: Any) -> str:
+    """A usage error in one line that names the command whose --help says more; the help itself as it is."""
+    path = error.ctx.command_path if error.ctx is not None else ""
+    words = " ".join(["lie-codegen", *path.split("lie_codegen")[-1].split("lie-codegen")[-1].split(), "--help"])
+    message = str(error.format_message())
+    return message if "\n" in message.strip() else f"lie-codegen: {message} See {words}."
+
+
 def _show_warning(message: Any, *rest: Any, **named: Any) -> None:
     complain(f"lie-codegen: warning: {message}")
 
@@ -33,7 +45,12 @@ def main() -> None:
     """Entry point: exit status 2 for bad input with one line, 1 for a computation that failed."""
     warnings.showwarning = cast(Any, _show_warning)
     try:
-        app()
+        sys.exit(app(standalone_mode=False))
+    except _UsageError as error:
+        complain(_one_line(error))
+        sys.exit(2)
+    except typer.Abort:
+        sys.exit(1)
     except InputError as error:
         complain(f"lie-codegen: {error}")
         sys.exit(2)

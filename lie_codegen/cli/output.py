@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -27,6 +28,8 @@ def plain(value: Any) -> Any:
         return plain(value.item())
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None  # JSON has neither NaN nor infinity
     if value is None or isinstance(value, str | int | float | bool):
         return value
     return str(value)

@@ -174,7 +174,9 @@ def parameter_numbers(symbols: Sequence[sp.Symbol], parameters: Mapping[str, Any
     given = dict(parameters or {})
     missing = [str(s) for s in symbols if str(s) not in given]
     if missing:
-        raise InputError(f"parameters: {', '.join(missing)} stayed symbolic and needs a value")
+        raise InputError(
+            f"parameters: {', '.join(missing)} stayed symbolic and needs a value: parameters={{{missing[0]!r}: ...}}"
+        )
     return {s: sp.Float(given[str(s)], 17) for s in symbols}
 
 

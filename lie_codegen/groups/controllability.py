@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from lie_codegen.algebra.controllability import Controllability
 from lie_codegen.algebra.controllability import controllability as algebra_controllability
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 
 
 def controllability(group: MatrixGroup, controls: Sequence[str | int]) -> Controllability:
@@ -15,4 +15,5 @@ def controllability(group: MatrixGroup, controls: Sequence[str | int]) -> Contro
     Raises:
         InputError: an unknown or repeated control, or none.
     """
+    require_group(group, "controllability")
     return algebra_controllability(group.algebra, controls)

@@ -93,11 +93,11 @@ def body_from_spatial(group: MatrixGroup, X: ArrayLike, s: ArrayLike) -> Array:
     return np.asarray(group.project(np.linalg.inv(matrix) @ group.hat(s) @ matrix))
 
 
-def rotation_from_quaternion(q: ArrayLike, *, order: str) -> Array:
+def rotation_from_quaternion(q: ArrayLike, *, order: str | None = None) -> Array:
     """Rotation matrices (..., 3, 3) of quaternions (..., 4) of any length but zero; `order` is "wxyz" or "xyzw".
 
     Raises:
-        InputError: another order, or a zero quaternion.
+        InputError: no order or another, or a zero quaternion.
         ShapeError: the last axis is not 4.
     """
     values = np.asarray(q, dtype=float)
@@ -105,7 +105,7 @@ def rotation_from_quaternion(q: ArrayLike, *, order: str) -> Array:
         raise ShapeError(f"q has shape {values.shape}; its last axis must be 4")
     w, x, y, z = np.moveaxis(values[..., _quaternion_order(order)], -1, 0)
     square = w * w + x * x + y * y + z * z
-    if not np.all(square > 0):
+    if not np.all((square > 0) & np.isfinite(square)):
         raise InputError("q is zero or not finite: it stands for no rotation")
     rows = [
         [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -115,7 +115,7 @@ def rotation_from_quaternion(q: ArrayLike, *, order: str) -> Array:
     return np.stack([np.stack([entry / square for entry in row], axis=-1) for row in rows], axis=-2)
 
 
-def quaternion_from_rotation(R: ArrayLike, *, order: str) -> Array:
+def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array:
     """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), with w >= 0; `order` is "wxyz" or "xyzw".
 
     Of the rows of 4 q q^T the one with the largest diagonal entry is normalised, so that no digit is lost at any angle. At w = 0
@@ -146,7 +146,10 @@ def quaternion_from_rotation(R: ArrayLike, *, order: str) -> Array:
     return np.asarray(q[..., np.argsort(places)])
 
 
-def _quaternion_order(order: str) -> tuple[int, ...]:
+def _quaternion_order(order: str | None) -> tuple[int, ...]:
+    if order is None:
+        raise InputError("the quaternion order is not given: order='wxyz' (scalar first) or order='xyzw' (scalar last)")
+    order = {"scalar_first": "wxyz", "scalar_last": "xyzw"}.get(order, order)
     if order not in _ORDERS:
         raise InputError(f"quaternion order {order!r} is neither 'wxyz' nor 'xyzw'")
     return _ORDERS[order]

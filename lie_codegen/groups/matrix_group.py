@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.algebra.constructions import permutation, reorder_algebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
-from lie_codegen.errors import NotFiniteError, NotInAlgebraError, ShapeError
+from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
 
 Array = NDArray[Any]
 
@@ -132,3 +132,14 @@ class MatrixGroup:
 
     def _rows(self) -> Any:
         return zip(self.labels, self.units, self.exact_basis, strict=True)
+
+
+def require_group(value: object, where: str) -> MatrixGroup:
+    """The value if it is a group.
+
+    Raises:
+        InputError: saying how to make one.
+    """
+    if isinstance(value, MatrixGroup):
+        return value
+    raise InputError(f"{where}: expected a group, got {value!r}; make one with lc.group(name) or lc.from_matrices(...)")

@@ -30,6 +30,7 @@ def quaternion_order(order: str | None) -> tuple[int, ...]:
     Raises:
         InputError: the order is not given or not known.
     """
+    order = {"wxyz": "scalar_first", "xyzw": "scalar_last"}.get(order, order) if order is not None else None
     if order is None or order not in ORDERS:
         given = "not given" if order is None else f"{order!r}"
         raise InputError(
@@ -54,7 +55,7 @@ def with_quaternion(law: Kernel, *, order: str | None = None) -> Kernel:
 
     Args:
         law: an attitude law or a tracking law on SO(3).
-        order: "scalar_first" or "scalar_last".
+        order: "scalar_first" ("wxyz") or "scalar_last" ("xyzw").
 
     Raises:
         InputError: the order is not given.
@@ -77,7 +78,7 @@ def with_quaternion(law: Kernel, *, order: str | None = None) -> Kernel:
             values[k] = _unit(rng)
         return tuple(values)
 
-    words = "(w, x, y, z)" if order == "scalar_first" else "(x, y, z, w)"
+    words = "(w, x, y, z)" if places == ORDERS["scalar_first"] else "(x, y, z, w)"
     ports = tuple(
         Port({"X": "q", "X_d": "q_d"}[port.name], (4,), "", description=f"{port.description}; unit quaternion {words}")
         if k in rotations

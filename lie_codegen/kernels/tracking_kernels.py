@@ -25,7 +25,7 @@ from lie_codegen.control.error_catalogue import catalogue_error, error_names, ga
 from lie_codegen.control.error_function import ErrorFunction, error_function
 from lie_codegen.control.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.errors import InputError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernels.compatibility import check_compatibility
@@ -55,7 +55,7 @@ def tracking_law(
     *,
     inertia: Any,
     error: Any,
-    gains: Mapping[str, Any],
+    gains: Mapping[str, Any] | None = None,
     feedforward: str = "basic",
     name: str = "tracking_law",
 ) -> Kernel:
@@ -75,8 +75,12 @@ def tracking_law(
         InputError: an indefinite inertia or gain, a name that is not known, a gain that is missing.
         IncompatibleError: phi and the transport map do not satisfy (A2); with the residual.
     """
+    require_group(group, "tracking_law")
     if feedforward not in FEEDFORWARDS:
         raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
+    if gains is not None and not isinstance(gains, Mapping):
+        raise InputError(f"gains must be a mapping such as {{'K_p': 4, 'K_d': 6}}, got {gains!r}")
+    gains = gains or {}
     pair = as_error(group, error, gains)
     metric = _inertia(group, inertia)
     K_d = positive_matrix(gain(gains, "K_d", "a tracking law"), group.dim, "K_d")

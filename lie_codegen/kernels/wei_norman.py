@@ -15,7 +15,7 @@ from typing import cast
 import sympy as sp
 
 from lie_codegen.algebra.adjoint import ad
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.kernels.arithmetic import Arithmetic
 from lie_codegen.kernels.block_solve import SparseMatrix, blocks_of
 from lie_codegen.kernels.exponential_entries import ExponentialEntries
@@ -141,5 +141,6 @@ def wei_norman(group: MatrixGroup) -> WeiNorman:
     M_inverse, determinant and M follow when they are read. The determinant is factored; that it never vanishes does not
     make the coordinates global: see `wei_norman_order`.
     """
+    require_group(group, "wei_norman")
     symbols = tuple(sp.Symbol(f"g{k}") for k in range(1, group.dim + 1))
     return WeiNorman(group, symbols, WeiNormanData(group))

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.invariants import check_invariants
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.simulation.chart import follow_chart
 from lie_codegen.simulation.grid import Grid, refine, sample
 from lie_codegen.simulation.inputs import Signal, as_signal
@@ -82,11 +83,13 @@ def simulate(
 
     Raises:
         ShapeError, NotFiniteError, InputError: naming the argument.
+        NotOnGroupError: X0 breaks a condition that every element of the group meets.
         ComputationError: if the tolerance is not reached with four million steps.
     """
+    require_group(group, "simulate")
     times = _check_times(group, t)
-    if not np.isfinite(eps):
-        raise NotFiniteError(f"simulate({group.name}): eps is {eps}")
+    if not isinstance(eps, int | float | np.number) or not np.isfinite(eps):
+        raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number")
     if not tolerance > 0:
         raise InputError(f"simulate({group.name}): tolerance must be positive, got {tolerance}")
     start = _initial(group, X0)
@@ -123,7 +126,10 @@ def _states(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array],
 
 
 def _check_times(group: MatrixGroup, t: ArrayLike) -> Array:
-    times = np.asarray(t, dtype=float)
+    try:
+        times = np.asarray(t, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"simulate({group.name}): t must be an array of numbers, got {t!r}") from None
     if times.ndim != 1 or len(times) < 2:
         raise ShapeError(f"simulate({group.name}): t has shape {times.shape}; give two or more times")
     if not np.all(np.isfinite(times)):
@@ -139,6 +145,8 @@ def _initial(group: MatrixGroup, X0: ArrayLike | None) -> Array:
     if X0 is None:
         return np.eye(d, dtype=kind)
     given = np.asarray(X0)
+    if given.dtype.kind not in "biufc":
+        raise ShapeError(f"simulate({group.name}): X0 must be a ({d}, {d}) array of numbers, got {X0!r}")
     if not group.is_complex and np.iscomplexobj(given):
         raise ShapeError(f"simulate({group.name}): X0 is complex, the group is real")
     start = np.ascontiguousarray(given, dtype=kind)
@@ -146,4 +154,5 @@ def _initial(group: MatrixGroup, X0: ArrayLike | None) -> Array:
         raise ShapeError(f"simulate({group.name}): X0 has shape {start.shape}; it must be ({d}, {d})")
     if not np.all(np.isfinite(start)):
         raise NotFiniteError(f"simulate({group.name}): X0 holds NaN or infinity")
+    check_invariants(group, start, f"simulate({group.name}): X0")
     return start

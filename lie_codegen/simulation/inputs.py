@@ -39,7 +39,7 @@ def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
     """
     if callable(u):
         return Signal(_vectorised(group, u, t), _breakpoints(u, t))
-    values = np.asarray(u, dtype=float)
+    values = _numbers(group, u, "u")
     if not np.all(np.isfinite(values)):
         raise NotFiniteError(f"simulate({group.name}): u holds NaN or infinity")
     if values.shape == (group.dim,):
@@ -67,9 +67,19 @@ def _vectorised(group: MatrixGroup, u: Callable[[Any], Any], t: Array) -> Callab
     except (TypeError, ValueError, InputError):
         together = None
     expected = (len(probe), group.dim)
-    single = np.asarray(u(float(probe[0])), dtype=float)
+    single = _numbers(group, u(float(probe[0])), "u(t)")
     if single.shape != (group.dim,):
         raise ShapeError(f"simulate({group.name}): u(t) has shape {single.shape}; it must be ({group.dim},)")
     if together is not None and together.shape == expected and np.array_equal(together[0], single):
         return lambda s: np.asarray(u(s), dtype=float)
     return lambda s: np.array([u(float(moment)) for moment in s], dtype=float).reshape(len(s), group.dim)
+
+
+def _numbers(group: MatrixGroup, value: Any, what: str) -> Array:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"simulate({group.name}): {what} must be real numbers, got {value!r}; formulas go through lc.PeriodicInput, "
+            "or a function of t"
+        ) from None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.algebra.controllability import Controllability, require_controllable
 from lie_codegen.errors import InputError, SteeringInputError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.simulation.metric import group_element
 
 Array = NDArray[Any]
@@ -48,6 +48,7 @@ def make_task(
         UncontrollableError: with the growth vector and the missing directions.
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
     """
+    require_group(group, "steer")
     report = require_controllable(group.algebra, controls)
     if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
         raise SteeringInputError(

@@ -100,6 +100,8 @@ def order_check(
         InputError: bad eps, horizon or metric; AssumptionError as `average`.
         ChartError: the coordinates of the metric reach the edge of their chart.
     """
+    if isinstance(eps, str) or not all(isinstance(e, int | float | np.number) for e in eps):
+        raise InputError(f"order_check: eps must hold two or more different positive numbers, got {eps!r}")
     values = tuple(sorted((float(e) for e in eps), reverse=True))
     if len(set(values)) < max(2, len(values)) or not all(0 < e < np.inf for e in values):
         raise InputError(f"order_check: eps must hold two or more different positive numbers, got {tuple(eps)}")

@@ -136,7 +136,9 @@ class VibrationalAverage:
         names = [str(p) for p in self.fields.parameters]
         missing = [name for name in names if name not in given]
         if missing:
-            raise InputError(f"parameters: {', '.join(missing)} stayed symbolic and needs a value")
+            raise InputError(
+                f"parameters: {', '.join(missing)} stayed symbolic and needs a value: parameters={{{missing[0]!r}: ...}}"
+            )
         unknown = sorted(set(given) - set(names))
         if unknown:
             raise InputError(f"parameters: {unknown[0]!r} is unknown; symbolic here: {', '.join(names) or 'none'}")
@@ -165,6 +167,8 @@ def vibrational_average(
 
     Source: Sanyal, Bloch and McClamroch, (14)-(17), (22)-(24), corrected.
     """
+    if not isinstance(u, PeriodicInput):
+        raise InputError(f"vibrational_average: u is {type(u).__name__}; make it a PeriodicInput")
     return VibrationalAverage(vibrational_fields(system, u, order=order, gauge=gauge, mean_to_drift=mean_to_drift))
 
 
