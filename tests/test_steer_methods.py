@@ -16,6 +16,7 @@ from lie_codegen.errors import (
     SteeringInputError,
     UncontrollableError,
 )
+from lie_codegen.steering.averaged_end import averaged_end
 from lie_codegen.steering.fourier import Family
 
 CASES = {
@@ -69,6 +70,37 @@ def test_the_averaged_plan_errs_by_the_order_it_claims() -> None:
         target = expm(group.hat([0, 0, size]))
         errors.append(lc.steer(group, target, (0, 1), 1.0, method="area_rule", exact=False).error)
     assert errors[0] / errors[1] >= 4**1.5 * 0.9
+
+
+@pytest.mark.parametrize(("name", "controls"), [("so3", (0, 1)), ("se3", (0, 1, 3)), ("su2", (0, 1))])
+def test_the_averaged_endpoint_of_any_order(name: str, controls: tuple[int, ...]) -> None:
+    """Order 2 is the area rule; halving the controls divides what is left by 2^(p + 1)."""
+    family = Family(lc.group(name), controls, 2)
+    c = 0.1 * np.random.default_rng(3).normal(size=family.energy_weights.shape)
+    for mine, areas in zip(averaged_end(family, c, 2), family.averaged(c), strict=True):
+        np.testing.assert_allclose(mine, areas, atol=1e-14)
+    for order in (2, 3, 4):
+        left = []
+        for each in (c, c / 2):
+            X = family.exact(each, 8)[0]
+            gap = np.linalg.solve(expm(family.group.hat(averaged_end(family, each, order)[0])), X) - np.eye(len(X))
+            left.append(np.linalg.norm(gap))
+        assert left[0] / left[1] > 0.8 * 2 ** (order + 1)
+    slope = averaged_end(family, 5 * c, 4)[1]
+    for k, e in enumerate(1e-6 * np.eye(len(c))):
+        difference = (averaged_end(family, 5 * c + e, 4)[0] - averaged_end(family, 5 * c - e, 4)[0]) / 2e-6
+        np.testing.assert_allclose(slope[:, k], difference, atol=1e-8)
+
+
+def test_without_retuning_a_higher_order_ends_nearer() -> None:
+    group = lc.group("so3")
+    target = expm(group.hat([0.1, -0.1, 0.2]))
+    errors = [
+        lc.steer(group, target, (0, 1), 1.0, method="area_rule", order=p, exact=False, starts=2).error
+        for p in (2, 3, 4)
+    ]
+    assert errors[1] < 0.4 * errors[0]
+    assert errors[2] < 0.4 * errors[1]
 
 
 def test_on_heisenberg_the_circle_is_optimal() -> None:

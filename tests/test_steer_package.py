@@ -29,9 +29,23 @@ def write(tree: dict[str, str], folder: Path) -> Path:
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.parametrize(
-    ("name", "controls"), [("so3", ("w1", "w2")), ("se2", (0, 1)), ("su2", (0, 1)), ("se3", (0, 1, 3))]
+    ("name", "controls", "lanes"),
+    [
+        ("so3", ("w1", "w2"), ()),
+        ("so3", ("w1", "w2"), ("-DLIE_CODEGEN_ONE_LANE",)),
+        ("se3", (0, 1, 3), ()),
+        *(
+            pytest.param(name, controls, lanes, marks=pytest.mark.slow)
+            for name, controls, lanes in [
+                ("se2", (0, 1), ()),
+                ("su2", (0, 1), ()),
+                ("se2", (0, 1), ("-DLIE_CODEGEN_ONE_LANE",)),
+                ("su2", (0, 1), ("-DLIE_CODEGEN_ONE_LANE",)),
+                ("se3", (0, 1, 3), ("-DLIE_CODEGEN_ONE_LANE",)),
+            ]
+        ),
+    ],
 )
-@pytest.mark.parametrize("lanes", [(), ("-DLIE_CODEGEN_ONE_LANE",)])
 def test_the_example_compiles_by_itself_and_is_content(
     name: str, controls: tuple[str | int, ...], lanes: tuple[str, ...], tmp_path: Path
 ) -> None:

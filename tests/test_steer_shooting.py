@@ -131,7 +131,9 @@ def test_weights_make_a_control_dearer() -> None:
     assert dear.details["weighted_cost"] < np.trapezoid(even.u(times) ** 2 @ np.array([4.0, 1.0, 0.0]), times)
 
 
-@pytest.mark.parametrize("name", ["so3", "se2", "su2"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("so3", marks=pytest.mark.slow), "se2", pytest.param("su2", marks=pytest.mark.slow)]
+)
 def test_numpy_stands_in_for_the_compiler(name: str) -> None:
     group = lc.group(name)
     compiled = shooter(group, (0, 1))

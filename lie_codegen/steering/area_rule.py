@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.steering.averaged_end import averaged_end
 from lie_codegen.steering.constraints import limits
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.fourier import Family
@@ -27,24 +28,29 @@ _SAMPLES = 65
 _SHARP = 1e-13
 _FINE = 8
 _TRIED = 3
+_MOST_ORDER = 8
 
 
-def area_rule(task: Task, *, harmonics: int = 2, bounds: Any = None, exact: bool = True, starts: int = 8) -> Plan:
+def area_rule(
+    task: Task, *, harmonics: int = 2, order: int = 2, bounds: Any = None, exact: bool = True, starts: int = 8
+) -> Plan:
     """Fourier controls of least energy whose averaged endpoint is the target, then retuned.
 
     minimise int |u|^2 subject to int U + 1/2 int [U~, U] = log(target): the second-order area rule in its single-exponential
-    form, a small quadratic program with quadratic constraints. Retuning then solves the same problem with the true
-    endpoint instead of the averaged one.
+    form, a small quadratic program with quadratic constraints; to a higher order p the constraint has the terms of p
+    controls too (`averaged_end`). Retuning then solves the same problem with the true endpoint instead of the averaged one.
+    The controls are periodic: they end as they begin.
 
     Args:
         task: the task.
         harmonics: K; at least one for each bracket that is needed.
+        order: of averaging, p; the error without retuning is of order p + 1 in the size of the controls.
         bounds: of the controls, as in "transcription", at 65 samples.
         exact: retune to the target; else the plan is approximate, to second order of averaging.
         starts: phases of the first guess that are tried.
 
     Raises:
-        SteeringInputError: about an option; controls that need brackets of brackets with exact=False.
+        SteeringInputError: about an option; controls that need deeper brackets than the order sees, with exact=False.
         SteeringError: no member of the family reaches the target.
     """
     started = time.perf_counter()
@@ -52,17 +58,21 @@ def area_rule(task: Task, *, harmonics: int = 2, bounds: Any = None, exact: bool
     for name, value in (("harmonics", harmonics), ("starts", starts)):
         if operator.index(value) < 1:
             raise SteeringInputError(f"{where}: {name} must be at least 1, got {value}")
-    if task.report.depth > 1 and not exact:
+    if not 2 <= operator.index(order) <= _MOST_ORDER:
+        raise SteeringInputError(f"{where}: order must be between 2 and {_MOST_ORDER}, got {order}")
+    if task.report.depth >= order and not exact:
         raise SteeringInputError(
-            f"{where}: second-order averaging sees one bracket, these controls need {task.report.depth} "
-            f"(growth vector {task.report.growth}); use exact=True or method='optimal'"
+            f"{where}: averaging of order {order} sees {order - 1} nested brackets, these controls need {task.report.depth} "
+            f"(growth vector {task.report.growth}); use order={task.report.depth + 1}, exact=True or method='optimal'"
         )
     family = Family(task.group, task.controls, harmonics)
     low, high = (each * task.duration for each in limits(task.group, task.controls, bounds, f"{where}: bounds"))
     x = coordinates(task.group, task.target)
     s = np.linspace(0, 1, _SAMPLES)
     first = seed_controls(task.group, task.controls, task.report.depth, x, starts, _SAMPLES)
-    averaged, averaged_energy = _averaged_members(task, family, x, [family.fitted(u, s) for u in first], low, high)
+    averaged, averaged_energy = _averaged_members(
+        task, family, x, order, [family.fitted(u, s) for u in first], low, high
+    )
     best = averaged[0] if averaged and not exact else None
     tried = averaged[:_TRIED] or [family.fitted(u, s) for u in _optimum(task, s, first)]
     for c in tried if exact else ():
@@ -76,11 +86,12 @@ def area_rule(task: Task, *, harmonics: int = 2, bounds: Any = None, exact: bool
             "bounds, or method='optimal'"
         )
     coefficients = best.reshape(family.shape) / task.duration
-    gap, _ = _averaged_gap(family, x, best)
+    gap, _ = _averaged_gap(family, x, order, best)
     details = {
         "winner": "Fourier controls" + (", retuned" if exact else ", averaged"),
         "coefficients": coefficients,
         "harmonics": harmonics,
+        "order": order,
         "averaged_miss": float(np.linalg.norm(gap)),
         "averaged_energy": averaged_energy / task.duration,
         "optimality": "least energy within this family of controls, the best of the starts tried",
@@ -122,16 +133,21 @@ def loops(task: Task, *, exact: bool = True) -> Plan:
 
 
 def _averaged_members(
-    task: Task, family: Family, x: Array, first: list[Array], low: Array, high: Array
+    task: Task, family: Family, x: Array, order: int, first: list[Array], low: Array, high: Array
 ) -> tuple[list[Array], float]:
     """The members that meet x by averaging, cheapest first, without repetitions of equal energy; the least energy."""
-    if task.report.depth > 1:
+    if task.report.depth >= order:
         return [], np.inf
+    deep = task.report.depth > 1
+    if order > 2 and not deep:
+        first = _averaged_members(task, family, x, 2, first, low, high)[0][:_TRIED] or first
     found: list[Array] = []
     for guess in first:
-        c = _least_energy(family, guess, lambda c: _averaged_gap(family, x, c), low, high)
-        if np.max(np.abs(_averaged_gap(family, x, c)[0])) < 1e-8:
+        c = _least_energy(family, guess, lambda c: _averaged_gap(family, x, order, c), low, high)
+        if np.max(np.abs(_averaged_gap(family, x, order, c)[0])) < 1e-8:
             found.append(c)
+            if deep:  # each takes seconds
+                break
     found.sort(key=lambda c: _energy(family, c))
     return found, _energy(family, found[0]) if found else np.inf
 
@@ -147,8 +163,8 @@ def _energy(family: Family, c: Array) -> float:
     return float(np.sum(family.energy_weights * c * c))
 
 
-def _averaged_gap(family: Family, x: Array, c: Array) -> tuple[Array, Array]:
-    value, slope = family.averaged(c)
+def _averaged_gap(family: Family, x: Array, order: int, c: Array) -> tuple[Array, Array]:
+    value, slope = family.averaged(c) if order == 2 else averaged_end(family, c, order)
     return value - x, slope
 
 
