@@ -17,7 +17,7 @@ import toy_kernels
 from lie_codegen.codegen.opcodes import C99, C99_FORMS, c_literal
 from lie_codegen.codegen.package import render_library
 from lie_codegen.codegen.tape import tape_of, tape_of_function
-from lie_codegen.errors import CodegenError
+from lie_codegen.errors import CodegenError, ShapeError
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.lowering.casadi_arithmetic import function_of
 from lie_codegen.runtime.build import build_kernels
@@ -242,3 +242,9 @@ def test_names_that_CasADi_forbids_are_names_of_C() -> None:
     for name in ("a__b", "jac", "x_"):
         function = function_of(Kernel(name, "g_", (Port("x", ()),), (Port("y", ()),), lambda ops, x: (2 * x,)))
         assert function(3) == 6
+
+
+def test_a_body_that_gives_another_shape_than_its_port_is_refused() -> None:
+    short = Kernel("f", "g", (Port("x", ()),), (Port("y", (3,)),), lambda ops, x: ([x],))
+    with pytest.raises(ShapeError, match="gives 1 real numbers for the output y, which is declared with 3"):
+        function_of(short)

@@ -93,3 +93,15 @@ def test_changes_of_basis_that_are_none() -> None:
         lc.change_of_basis(sl2, {"a": {"h": 1}, "b": {"e": 1}, "c": {"q": 2}})
     with pytest.raises(InputError, match="basis element c"):
         lc.change_of_basis(sl2, {"a": {"h": 1}, "b": {"e": 1}, "c": {"f": 0.1}})
+
+
+def test_what_is_no_definition_is_named() -> None:
+    for call, words in (
+        (lambda: lc.product(lc.group("so3"), 5), "expected a group"),
+        (lambda: lc.group(None), "name of a group"),
+        (lambda: lc.from_matrices("a", ["x"], 5), "list of matrices"),
+        (lambda: lc.from_brackets("a", ["x", "y"], {("x", "y"): "y"}), "must be a mapping"),
+        (lambda: lc.from_brackets("a", ["x", "y"], [1]), "must be a mapping"),
+    ):
+        with pytest.raises(InputError, match=words):
+            call()

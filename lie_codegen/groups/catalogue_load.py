@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
+from lie_codegen.errors import UnknownGroupError
 from lie_codegen.groups.catalogue_names import definition_source, group_path, is_generated
 from lie_codegen.groups.families import family
 from lie_codegen.groups.group_file import parse_group_file
@@ -18,6 +19,8 @@ def group(name_or_path: str | Path) -> MatrixGroup:
         UnknownGroupError: no such name; lists those there are.
         GroupFileError, InputError: the file does not describe a group; names file, key and column.
     """
+    if not isinstance(name_or_path, str | Path):
+        raise UnknownGroupError(f"expected the name of a group or the path of a group file, got {name_or_path!r}")
     if is_generated(name_or_path):
         return _generated(str(name_or_path))
     return _parsed(definition_source(name_or_path), str(group_path(name_or_path)))

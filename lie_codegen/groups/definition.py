@@ -37,6 +37,8 @@ def from_matrices(
     """
     check_identifier(name, "name")
     labels = _labels(name, labels)
+    if isinstance(matrices, str) or not hasattr(matrices, "__len__"):
+        raise InputError(f"{name}: matrices must be a list of matrices, one for each label, got {matrices!r}")
     if len(matrices) != len(labels):
         raise ShapeError(f"{name}: {len(labels)} labels for {len(matrices)} matrices; give one matrix for each label")
     exact = tuple(exact_matrix(f"{name}: matrix {label}", m) for label, m in zip(labels, matrices, strict=True))
@@ -65,6 +67,8 @@ def from_brackets(
     """
     check_identifier(name, "name")
     labels = _labels(name, labels)
+    if not isinstance(brackets, Mapping) or not all(isinstance(value, Mapping) for value in brackets.values()):
+        raise InputError(f'{name}: brackets must be a mapping such as {{("a", "b"): {{"c": 1}}}}, got {brackets!r}')
     algebra = algebra_from_brackets(name, labels, brackets)
     return MatrixGroup(algebra, faithful_representation(algebra), _units(name, labels, units), description)
 

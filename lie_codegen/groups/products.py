@@ -12,7 +12,7 @@ from lie_codegen.algebra.exact import Number
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import AlgebraError, InputError, ShapeError
 from lie_codegen.groups.definition import exact_matrix
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier
 
@@ -29,6 +29,8 @@ def product(a: MatrixGroup, b: MatrixGroup, *, name: str | None = None) -> Matri
     Raises:
         IdentifierError: if the name cannot be a C identifier.
     """
+    require_group(a, "product")
+    require_group(b, "product")
     name = check_identifier(name if name is not None else f"{a.name}_x_{b.name}", "name")
     shift = a.dim
     table = {key: dict(row) for key, row in a.algebra.table.items()}

@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from lie_codegen.errors import ShapeError
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.kernel import Kernel, Port
 
@@ -53,6 +54,12 @@ def function_of(kernel: Kernel) -> ca.Function:
         ca.densify(ca.vertcat(*[ca.SX(entry) for entry in flatten(port, value)]))
         for port, value in zip(kernel.outputs, results, strict=True)
     ]
+    for port, entries in zip(kernel.outputs, flat, strict=True):
+        if entries.numel() != port.size:
+            raise ShapeError(
+                f"kernel {kernel.symbol}: its body gives {entries.numel()} real numbers for the output {port.name}, "
+                f"which is declared with {port.size}"
+            )
     # CasADi forbids some C identifiers (two underscores in a row); its name for the function never reaches the C
     return ca.Function(
         ca.Function.fix_name(kernel.symbol),
