@@ -62,15 +62,16 @@ def _logarithm(P: list[Array], dP: list[Array]) -> tuple[Array, Array]:
     """sum_q of the coefficients of log(I + sum eps^q P_q) up to q = p, and its derivative."""
     power, dpower = dict(enumerate(P, start=1)), dict(enumerate(dP, start=1))
     first, dfirst = dict(power), dict(dpower)
-    value, slope = sum(P), sum(dP)
+    value, slope = np.sum(P, axis=0), np.sum(dP, axis=0)
     for k in range(2, len(P) + 1):
-        sums, dsums = {}, {}
+        sums: dict[int, Array] = {}
+        dsums: dict[int, Array] = {}
         for q in range(k, len(P) + 1):
             pairs = [(a, q - a) for a in range(k - 1, q)]
-            sums[q] = sum(power[a] @ first[b] for a, b in pairs)
-            dsums[q] = sum(dpower[a] @ first[b] + power[a] @ dfirst[b] for a, b in pairs)
+            sums[q] = np.sum([power[a] @ first[b] for a, b in pairs], axis=0)
+            dsums[q] = np.sum([dpower[a] @ first[b] + power[a] @ dfirst[b] for a, b in pairs], axis=0)
         power, dpower = sums, dsums
         sign = (-1.0) ** (k + 1) / k
-        value = value + sign * sum(power.values())
-        slope = slope + sign * sum(dpower.values())
-    return np.asarray(value), np.asarray(slope)
+        value = value + sign * np.sum(list(power.values()), axis=0)
+        slope = slope + sign * np.sum(list(dpower.values()), axis=0)
+    return value, slope
