@@ -8,6 +8,7 @@ from the most important, and the rest is fitted again around what the rounding l
 
 from __future__ import annotations
 
+import ast
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -202,7 +203,7 @@ def main() -> int:
     mp.mp.dps = 60
     fresh = text()
     if "--check" in sys.argv[1:]:
-        return int(OUTPUT.read_text(encoding="utf-8") != fresh)
+        return int(ast.dump(ast.parse(OUTPUT.read_text(encoding="utf-8"))) != ast.dump(ast.parse(fresh)))
     OUTPUT.write_text(fresh, encoding="utf-8")
     return 0
 
