@@ -58,10 +58,10 @@ def test_coordinates_of_the_second_kind_follow_the_trajectory(name: str) -> None
         np.testing.assert_allclose(product, X, rtol=0, atol=1e-12)
 
 
-def test_the_trajectory_stays_on_the_group_over_a_million_steps() -> None:
+def test_the_trajectory_stays_on_the_group_over_many_steps() -> None:
     so3 = lc.group("so3")
-    run = lc.simulate(so3, lambda t: np.array([np.cos(t), np.sin(2 * t), 0.3]), t=[0.0, 2000.0], tolerance=1e-9)
-    assert run.steps > 30_000
+    run = lc.simulate(so3, lambda t: np.array([np.cos(t), np.sin(2 * t), 0.3]), t=[0.0, 500.0], tolerance=1e-9)
+    assert run.steps > 8_000
     assert np.max(np.abs(run.X[-1].T @ run.X[-1] - np.eye(3))) < 1e-11
 
 
