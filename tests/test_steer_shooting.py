@@ -15,8 +15,9 @@ import lie_codegen as lc
 from lie_codegen.codegen.steering_defaults import Defaults
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.extremal import Extremal
+from lie_codegen.steering.extremals import SOLVED
 from lie_codegen.steering.plan import Plan
-from lie_codegen.steering.shooting import SOLVED, shooter
+from lie_codegen.steering.shooting import shooter
 from lie_codegen.steering.shooting_numpy import NumpyShooting
 
 SYSTEMS = {"so3": ("w1", "w2"), "se2": (0, 1), "h3": (0, 1), "su2": (0, 1), "se3": (0, 1, 2, 3)}

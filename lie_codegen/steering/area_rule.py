@@ -14,12 +14,13 @@ from scipy.optimize import minimize
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.steering.averaged_end import averaged_end
 from lie_codegen.steering.constraints import limits
+from lie_codegen.steering.extremals import SOLVED
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.fourier import Family
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.segments import Chain
-from lie_codegen.steering.shooting import SOLVED, shooter
+from lie_codegen.steering.shooting import shooter
 from lie_codegen.steering.task import Task
 
 Array = NDArray[Any]

@@ -21,6 +21,7 @@ from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.simulation.flow import simulate
 from lie_codegen.simulation.metric import distance, element_coordinates
 from lie_codegen.steering.finish import energy
+from lie_codegen.steering.methods import OPEN_LOOP, plan_by
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.seeds import area_rule_seed
 from lie_codegen.steering.task import Task
@@ -115,12 +116,7 @@ def feedback(
 def _planned(task: Task, planner: str, options: dict[str, Any]) -> Controls:
     size = distance(task.group, task.target, np.eye(task.group.degree))
     if planner != "area_rule" and size > task.tolerance:
-        from lie_codegen.steering.front import steer
-
-        plan = steer(
-            task.group, task.target, task.controls, task.duration, planner, tolerance=task.tolerance, **options
-        )
-        return plan.u
+        return plan_by(OPEN_LOOP, planner, task, options).u
     x = element_coordinates(task.group, task.target)
     size = float(np.linalg.norm(x))
     x = x if size <= _SMALL_ENOUGH else x * (_SMALL_ENOUGH / size)

@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from lie_codegen.errors import SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.area_rule import area_rule, loops
 from lie_codegen.steering.feedback import feedback
-from lie_codegen.steering.four_phase import four_phase
-from lie_codegen.steering.optimal import optimal
+from lie_codegen.steering.methods import OPEN_LOOP, plan_by
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import make_task
-from lie_codegen.steering.transcription import transcription
-
-_METHODS: Mapping[str, Callable[..., Plan]] = {
-    "four_phase": four_phase,
-    "area_rule": area_rule,
-    "loops": loops,
-    "optimal": optimal,
-    "transcription": transcription,
-    "feedback": feedback,
-}
 
 
 def steer(
@@ -60,18 +47,5 @@ def steer(
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
         SteeringError: the solver found nothing admissible; says what was tried.
     """
-    if method == "auto":
-        method = "transcription" if set(options) - _options_of(optimal) else "optimal"
-    solver = _METHODS.get(method)
-    if solver is None:
-        raise SteeringInputError(f"no method {method!r}; there are auto, {', '.join(sorted(_METHODS))}")
-    known = _options_of(solver)
-    unknown = sorted(set(options) - known)
-    if unknown:
-        has = ", ".join(sorted(known)) or "none"
-        raise SteeringInputError(f"{method} has no option {', '.join(unknown)}; it has {has}")
-    return solver(make_task(group, target, controls, duration, tolerance), **options)
-
-
-def _options_of(solver: Callable[..., Plan]) -> set[str]:
-    return set(solver.__kwdefaults__ or {})
+    methods = {**OPEN_LOOP, "feedback": feedback}
+    return plan_by(methods, method, make_task(group, target, controls, duration, tolerance), options)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.simulation.flow import simulate
+from lie_codegen.steering.extremals import SOLVED
 from lie_codegen.steering.plan import Controls
 from lie_codegen.steering.seeds import coordinates, seed_controls
-from lie_codegen.steering.shooting import SOLVED, shooter
+from lie_codegen.steering.shooting import shooter
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription_problem import Structure
 

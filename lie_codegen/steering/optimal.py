@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError
 from lie_codegen.steering.extremal import Extremal
+from lie_codegen.steering.extremals import SOLVED, Extremals
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
-from lie_codegen.steering.shooting import SOLVED, Extremals, Shooter, shooter
+from lie_codegen.steering.shooting import Shooter, shooter
 from lie_codegen.steering.task import Task
 
 Array = NDArray[Any]

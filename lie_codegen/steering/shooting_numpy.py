@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.codegen.steering_defaults import Defaults
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.extremals import Extremals
 from lie_codegen.steering.seeds import coordinates, seed_controls
-
-if TYPE_CHECKING:
-    from lie_codegen.steering.shooting import Extremals
 
 Array = NDArray[Any]
 
@@ -34,8 +32,6 @@ class NumpyShooting:
 
     def solve(self, targets: Array, weights: Array, starts: int) -> Extremals:
         """As `Shooter.solve`."""
-        from lie_codegen.steering.shooting import Extremals
-
         rows = [self._solve_one(target, weights, starts) for target in targets]
         return Extremals(**{name: np.array([row[name] for row in rows]) for name in Extremals.__dataclass_fields__})
 

@@ -1,0 +1,47 @@
+"""The open-loop steering methods by name, with the options each takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from lie_codegen.errors import SteeringInputError
+from lie_codegen.steering.area_rule import area_rule, loops
+from lie_codegen.steering.four_phase import four_phase
+from lie_codegen.steering.optimal import optimal
+from lie_codegen.steering.plan import Plan
+from lie_codegen.steering.task import Task
+from lie_codegen.steering.transcription import transcription
+
+Method = Callable[..., Plan]
+
+OPEN_LOOP: Mapping[str, Method] = {
+    "four_phase": four_phase,
+    "area_rule": area_rule,
+    "loops": loops,
+    "optimal": optimal,
+    "transcription": transcription,
+}
+
+
+def plan_by(methods: Mapping[str, Method], method: str, task: Task, options: Mapping[str, Any]) -> Plan:
+    """The plan of one of the methods; "auto" is "transcription" if an option asks for it, else "optimal".
+
+    Raises:
+        SteeringInputError: an unknown method or option.
+    """
+    if method == "auto":
+        method = "transcription" if set(options) - _options_of(optimal) else "optimal"
+    solver = methods.get(method)
+    if solver is None:
+        raise SteeringInputError(f"no method {method!r}; there are auto, {', '.join(sorted(methods))}")
+    known = _options_of(solver)
+    unknown = sorted(set(options) - known)
+    if unknown:
+        has = ", ".join(sorted(known)) or "none"
+        raise SteeringInputError(f"{method} has no option {', '.join(unknown)}; it has {has}")
+    return solver(task, **options)
+
+
+def _options_of(solver: Method) -> set[str]:
+    return set(solver.__kwdefaults__ or {})
