@@ -21,7 +21,7 @@ import toy_kernels
 
 from lie_codegen.errors import CacheError, CacheWarning, CodegenError, CompileError, NoCompilerWarning
 from lie_codegen.kernels.kernel import Kernel, Port
-from lie_codegen.runtime import build, cache, cache_folder, compiler
+from lie_codegen.runtime import build, cache, cache_folder, compiler, ladder
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
@@ -48,13 +48,13 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def compiles(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The runs of the compiler."""
     runs: list[str] = []
-    real = build.compile_library
+    real = ladder.compile_library
 
     def counted(*args: Any) -> None:
         runs.append(args[2])
         real(*args)
 
-    monkeypatch.setattr(build, "compile_library", counted)
+    monkeypatch.setattr(ladder, "compile_library", counted)
     return runs
 
 

@@ -11,7 +11,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, is_zero, product
 from lie_codegen.kernels.complex_scalar import Complex
-from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernels.kernel import Body, Kernel, Port
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, product_exp, rate
 
 #: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
@@ -115,11 +115,17 @@ def rkmk4_step(group: MatrixGroup) -> Kernel:
     u0, um, u1 are u at t, t + h/2, t + h; exact on the group, global error O(h^4); |h u| <= 1/4 keeps the
     exponential exact to rounding.
     """
-    n, d = group.dim, group.degree
 
     def body(ops: Arithmetic, X: Any, u0: Any, um: Any, u1: Any, h: Any) -> tuple[Any, ...]:
         return (times_taylor_exp(group, ops, X, rkmk4_increment(group, ops, u0, um, u1, h)),)
 
+    formula = "X_next = X exp(Theta), Theta by one RKMK4 step of Theta' = dexpinv(u)"
+    return flow_step(group, "rkmk4_step", body, formula, "Munthe-Kaas, BIT 38 (1998) 92")
+
+
+def flow_step(group: MatrixGroup, name: str, body: Body, formula: str, source: str) -> Kernel:
+    """The kernel of a step (X, u0, um, u1, h) -> X_next of X' = X hat(u), u at t, t + h/2 and t + h."""
+    n, d = group.dim, group.degree
     data = WeiNormanData(group)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
@@ -127,17 +133,17 @@ def rkmk4_step(group: MatrixGroup) -> Kernel:
         return (X, *([rng.uniform(-1, 1) for _ in range(n)] for _ in range(3)), rng.uniform(0, 0.1))
 
     return Kernel(
-        name="rkmk4_step",
+        name=name,
         namespace=group.name,
         inputs=(
             Port("X", (d, d), is_complex=group.is_complex),
-            *(Port(name, (n,)) for name in ("u0", "um", "u1")),
+            *(Port(each, (n,)) for each in ("u0", "um", "u1")),
             Port("h", (), "s"),
         ),
         outputs=(Port("X_next", (d, d), is_complex=group.is_complex),),
         body=body,
-        formula="X_next = X exp(Theta), Theta by one RKMK4 step of Theta' = dexpinv(u)",
-        source="Munthe-Kaas, BIT 38 (1998) 92",
+        formula=formula,
+        source=source,
         sampler=sampler,
     )
 

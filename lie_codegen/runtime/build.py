@@ -10,30 +10,25 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from lie_codegen.errors import CacheError, CodegenError, CompileError
+from lie_codegen.errors import CacheError, CodegenError
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.backend import CtypesBackend, InterpretedBackend, load_library
 from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
 from lie_codegen.runtime.cache_upkeep import evict
 from lie_codegen.runtime.call import Compiled
-from lie_codegen.runtime.compiler import (
-    Compiler,
-    compile_library,
-    find_compilers,
-    flags_for,
-    is_working,
-    warn_no_compiler,
-)
+from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, warn_no_compiler
 from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
 from lie_codegen.runtime.extension import extension
+from lie_codegen.runtime.ladder import compile_entry, first_that_works
 from lie_codegen.runtime.lane_library import ONE_LANE, LaneLibrary, keep_sources
 from lie_codegen.runtime.library import Library, check_names
 from lie_codegen.runtime.quick import quick
 
-_SUFFIX = ".so"
+if TYPE_CHECKING:
+    from lie_codegen.codegen.package import LibrarySources
 
 
 def build_kernels(
@@ -130,8 +125,8 @@ def _compile(
     sources = render_library(namespace, kernels)
     check_names(sources.signatures)
     flags = flags_for(sources.statements)
-    failure: CompileError | None = None
-    for number, compiler in enumerate(compilers):
+
+    def attempt(number: int, compiler: Compiler) -> cache.Entry:
         key = digest(
             {
                 "files": dict(sources.files),
@@ -143,35 +138,28 @@ def _compile(
                 "cpu": cpu_identity(),
             }
         )
-        try:
-            with cache.lock(folder, key):
-                entry = cache.find_entry(folder, key) or _fill(folder, key, namespace, sources, compiler, flags)
-                if requests:
-                    cache.store_request(folder, requests[number], key)
-        except CompileError as error:
-            with cache.scratch(folder) as probe:
-                if is_working(compiler, probe):
-                    raise
-            failure = failure or error
-            continue
-        beside.join()
-        library = _open(entry)
-        evict(folder, keep=key)
-        return library
-    raise failure or CompileError("no compiler to try")
+        with cache.lock(folder, key):
+            entry = cache.find_entry(folder, key) or _fill(folder, key, namespace, sources, compiler, flags)
+            if requests:
+                cache.store_request(folder, requests[number], key)
+        return entry
+
+    entry = first_that_works(folder, compilers, attempt)
+    beside.join()
+    library = _open(entry)
+    evict(folder, keep=entry.library.parent.name)
+    return library
 
 
 def _fill(
-    folder: Path, key: str, namespace: str, sources: Any, compiler: Compiler, flags: tuple[str, ...]
+    folder: Path, key: str, namespace: str, sources: LibrarySources, compiler: Compiler, flags: tuple[str, ...]
 ) -> cache.Entry:
-    with cache.scratch(folder) as home:
-        for name, text in sources.files.items():
-            (home / name).write_bytes(text.encode())
-        output = f"{namespace}{_SUFFIX}"
-        compile_library(compiler, home, sources.main, output, (*flags, ONE_LANE))
-        entry = cache.store_entry(folder, key, home / output, namespace, sources.signatures, sources.notes)
-        keep_sources(entry, sources.files, sources.main, flags, compiler)
-        return entry
+    one_lane = (*flags, ONE_LANE)
+    entry = compile_entry(
+        folder, key, sources.files, sources.main, namespace, compiler, one_lane, sources.signatures, sources.notes
+    )
+    keep_sources(entry, sources.files, sources.main, flags, compiler)
+    return entry
 
 
 def _open_or_none(entry: cache.Entry) -> Library | None:

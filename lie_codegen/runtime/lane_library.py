@@ -16,8 +16,9 @@ from typing import Any
 
 from lie_codegen.errors import CompileError
 from lie_codegen.runtime import cache
-from lie_codegen.runtime.compiler import Compiler, compile_library, find_compilers
+from lie_codegen.runtime.compiler import Compiler, find_compilers
 from lie_codegen.runtime.digests import digest
+from lie_codegen.runtime.ladder import compile_entry
 
 #: What the first compilation defines: lanes of one sample.
 ONE_LANE = "-DLCG_LANES=1"
@@ -63,13 +64,16 @@ class LaneLibrary:
         return entry.library
 
     def _compile(self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler) -> cache.Entry:
-        namespace = self._entry.namespace
-        with cache.scratch(folder) as home:
-            for name, text in sources["files"].items():
-                (home / Path(name).name).write_bytes(text.encode())
-            output = f"{namespace}_lanes.so"
-            compile_library(compiler, home, sources["main"], output, tuple(sources["flags"]))
-            return cache.store_entry(folder, key, home / output, namespace, self._entry.signatures)
+        return compile_entry(
+            folder,
+            key,
+            sources["files"],
+            sources["main"],
+            self._entry.namespace,
+            compiler,
+            tuple(sources["flags"]),
+            self._entry.signatures,
+        )
 
 
 def keep_sources(

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from lie_codegen.errors import CompileError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
 from lie_codegen.runtime.cache_upkeep import evict
-from lie_codegen.runtime.compiler import Compiler, compile_library, find_compilers, is_working, warn_no_compiler
+from lie_codegen.runtime.compiler import Compiler, find_compilers, warn_no_compiler
 from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
+from lie_codegen.runtime.ladder import compile_entry, first_that_works
 
 #: Multiplications and additions may fuse here: an iterative solver has no bits to reproduce.
 SOLVER_FLAGS = ("-O2", "-march=native", "-std=c99", "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
@@ -71,29 +71,13 @@ def _compile(
     definition: str,
     compilers: tuple[Compiler, ...],
 ) -> Path:
-    failure: CompileError | None = None
-    for compiler in compilers:
+    def attempt(number: int, compiler: Compiler) -> cache.Entry:
         key = _key(compiler, namespace, definition)
-        try:
-            with cache.lock(folder, key):
-                entry = cache.find_entry(folder, key) or _fill(folder, key, files, main, namespace, compiler)
-        except CompileError as error:
-            with cache.scratch(folder) as probe:
-                if is_working(compiler, probe):
-                    raise
-            failure = failure or error
-            continue
-        evict(folder, keep=key)
-        return entry.library
-    raise failure or CompileError("no compiler to try")
+        with cache.lock(folder, key):
+            return cache.find_entry(folder, key) or compile_entry(
+                folder, key, files, main, namespace, compiler, SOLVER_FLAGS
+            )
 
-
-def _fill(
-    folder: Path, key: str, files: Mapping[str, str], main: str, namespace: str, compiler: Compiler
-) -> cache.Entry:
-    with cache.scratch(folder) as home:
-        for name, text in files.items():
-            (home / name).write_bytes(text.encode())
-        output = f"{namespace}.so"
-        compile_library(compiler, home, main, output, SOLVER_FLAGS)
-        return cache.store_entry(folder, key, home / output, namespace, ())
+    entry = first_that_works(folder, compilers, attempt)
+    evict(folder, keep=entry.library.parent.name)
+    return entry.library
