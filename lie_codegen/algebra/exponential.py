@@ -10,7 +10,7 @@ ever simplified: the cost is that of one small linear system (Putzer's method; A
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -61,6 +61,17 @@ class MatrixExponential:
     def radius(self) -> float:
         """The largest modulus of an eigenvalue: the inverse of the natural scale of x."""
         return max((float(abs(complex(mode.rate + sp.I * mode.frequency))) for mode in self.modes), default=0.0)
+
+    @cached_property
+    def reflected(self) -> MatrixExponential:
+        """exp(-x A) by functions of x."""
+        signs = [(-1) ** (mode.power + mode.odd) for mode in self.modes]
+        modes = tuple(replace(mode, rate=-mode.rate) for mode in self.modes)
+        entries = {place: {m: signs[m] * value for m, value in row.items()} for place, row in self.entries.items()}
+        taylor = {
+            place: tuple((-1) ** order * value for order, value in enumerate(row)) for place, row in self.taylor.items()
+        }
+        return MatrixExponential(self.size, modes, entries, taylor)
 
 
 def matrix_exponential(matrix: sp.MatrixBase) -> MatrixExponential:

@@ -1,4 +1,4 @@
-"""Solving A x = b over any arithmetic: block-triangular form, adjugates for blocks up to 3, QR above.
+"""Solving A x = b over any arithmetic: block-triangular form, adjugates for blocks up to 4, QR above.
 
 Symmetric permutation to block-triangular form needs only a zero-free diagonal, which the Wei-Norman matrices
 have (they are the identity at g = 0). Adjugates divide by the determinant of the block alone, so a solution is
@@ -12,10 +12,13 @@ from typing import Any
 
 from sympy.utilities.iterables import strongly_connected_components
 
-from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernels.arithmetic import Scalar
 
 #: (row, column) -> entry; what is not there is zero.
 SparseMatrix = Mapping[tuple[int, int], Scalar]
+
+#: Blocks up to this size divide once, by their determinant.
+_LARGEST_ADJUGATE = 4
 
 
 def blocks_of(matrix: SparseMatrix, size: int) -> list[list[int]]:
@@ -25,7 +28,7 @@ def blocks_of(matrix: SparseMatrix, size: int) -> list[list[int]]:
     return [sorted(component) for component in components]
 
 
-def solve(ops: Arithmetic, matrix: SparseMatrix, right_hand_sides: Sequence[Mapping[int, Scalar]], size: int) -> Any:
+def solve(matrix: SparseMatrix, right_hand_sides: Sequence[Mapping[int, Scalar]], size: int) -> list[dict[int, Scalar]]:
     """For each right-hand side (sparse) the sparse solution x of A x = b."""
     solutions: list[dict[int, Scalar]] = [{} for _ in right_hand_sides]
     rows: dict[int, dict[int, Scalar]] = {}
@@ -34,7 +37,7 @@ def solve(ops: Arithmetic, matrix: SparseMatrix, right_hand_sides: Sequence[Mapp
     for block in blocks_of(matrix, size):
         inside = set(block)
         dense = [[rows[i].get(j, 0) for j in block] for i in block]
-        factor = _BlockSolver(ops, dense)
+        factor = _BlockSolver(dense)
         for b, x in zip(right_hand_sides, solutions, strict=True):
             residual = []
             for i in block:
@@ -47,14 +50,6 @@ def solve(ops: Arithmetic, matrix: SparseMatrix, right_hand_sides: Sequence[Mapp
                 continue
             x.update((i, value) for i, value in zip(block, factor.solve(residual), strict=True) if not is_zero(value))
     return solutions
-
-
-def determinant_factors(matrix: SparseMatrix, size: int) -> list[Scalar]:
-    """The determinants of the diagonal blocks; their product is det A (blocks above 3 by expansion)."""
-    rows: dict[int, dict[int, Scalar]] = {}
-    for (i, j), value in matrix.items():
-        rows.setdefault(i, {})[j] = value
-    return [determinant([[rows[i].get(j, 0) for j in block] for i in block]) for block in blocks_of(matrix, size)]
 
 
 def is_zero(value: Any) -> bool:
@@ -94,18 +89,17 @@ def determinant(matrix: Sequence[Sequence[Scalar]]) -> Scalar:
 class _BlockSolver:
     """One diagonal block, factored once for all right-hand sides."""
 
-    def __init__(self, ops: Arithmetic, dense: list[list[Scalar]]) -> None:
-        self.ops = ops
+    def __init__(self, dense: list[list[Scalar]]) -> None:
         self.size = len(dense)
         self.dense = dense
-        if self.size <= 3:
+        if self.size <= _LARGEST_ADJUGATE:
             self.adjugate = _adjugate(dense)
             self.determinant = determinant(dense)
         else:
             self.q, self.r = _gram_schmidt(dense)
 
     def solve(self, b: list[Scalar]) -> list[Scalar]:
-        if self.size <= 3:
+        if self.size <= _LARGEST_ADJUGATE:
             values = [_dot(row, b) for row in self.adjugate]
             if isinstance(self.determinant, int) and self.determinant == 1:
                 return values

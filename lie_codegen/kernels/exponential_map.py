@@ -89,7 +89,7 @@ def _plain(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], sign: in
         return J
     n = data.group.dim
     sparse = {(i, j): value for i, row in enumerate(J) for j, value in enumerate(row) if not is_zero(value)}
-    columns = solve(ops, sparse, [{j: 1} for j in range(n)], n)
+    columns = solve(sparse, [{j: 1} for j in range(n)], n)
     return [[column.get(i, 0) for column in columns] for i in range(n)]
 
 

@@ -92,7 +92,7 @@ class GroupMatrices:
             return [list(column) for column in zip(*block, strict=True)]
         size = len(block)
         sparse = {(i, j): block[i][j] for i in range(size) for j in range(size) if not _is_zero(block[i][j])}
-        columns = solve(self.ops, sparse, [{j: 1} for j in range(size)], size)
+        columns = solve(sparse, [{j: 1} for j in range(size)], size)
         return [[column.get(i, 0) for column in columns] for i in range(size)]
 
 

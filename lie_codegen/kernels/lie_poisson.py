@@ -10,7 +10,8 @@ Everything is a polynomial, so that the same text runs on one double or on a vec
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from fractions import Fraction
 from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -28,9 +29,10 @@ SEED_EXPONENTIAL_DEGREE = 8
 def shooting_kernels(group: MatrixGroup, controls: tuple[int, ...]) -> tuple[Kernel, ...]:
     """All that the shooting solver needs to know about a group; elements of the group are packed."""
     return (
-        transport(group, controls),
         coadjoint(group, controls),
-        sensitivity_column(group, controls),
+        leap(group, controls),
+        flow_step(group, controls),
+        column_step(group, controls),
         endpoint(group),
         advance(group),
         offset(group),
@@ -66,25 +68,82 @@ def coadjoint(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     )
 
 
-def sensitivity_column(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
-    """(u, mu, du, psi, xi) -> (psi', xi'): one column of the variational equations."""
-    n, m = group.dim, len(controls)
+def leap(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(v, before, here) -> before + 2 h f(here) for (mu, X), where v_i = 2 h / w_i: a substep of the midpoint rule."""
+    n, size = group.dim, packed_size(group)
 
-    def body(ops: Arithmetic, u: Any, mu: Any, du: Any, psi: Any, xi: Any) -> tuple[Any, ...]:
-        forced = _coadjoint(group, controls, ops, du, mu)
-        psi_rate = [add(a, b) for a, b in zip(forced, _coadjoint(group, controls, ops, u, psi), strict=True)]
-        xi_rate = bracket_body(group, ops, xi, _spread(group, controls, u))
-        for value, position in zip(du, controls, strict=True):
-            xi_rate[position] = add(value, xi_rate[position])
-        return psi_rate, xi_rate
+    def body(ops: Arithmetic, v: Any, mu_before: Any, X_before: Any, mu: Any, X: Any) -> tuple[Any, ...]:
+        mu_rate, X_rate = _rates(group, controls, ops, v, mu, X)
+        return _sum(mu_before, mu_rate), _sum(X_before, X_rate)
 
     return Kernel(
-        "sensitivity",
+        "leap",
         group.name,
-        (Port("u", (m,)), Port("mu", (n,)), Port("du", (m,)), Port("psi", (n,)), Port("xi", (n,))),
-        (Port("psi_rate", (n,)), Port("xi_rate", (n,))),
+        (
+            Port("v", (len(controls),)),
+            *(Port(name, (n,)) if name.startswith("mu") else Port(name, (size,)) for name in _LEAP),
+        ),
+        (Port("mu_next", (n,)), Port("X_next", (size,))),
         body,
-        formula="psi' = ad*_du mu + ad*_u psi, xi' = du + [xi, u]",
+        formula="before + 2 h f(here), v_i = 2 h / w_i",
+    )
+
+
+_LEAP = ("mu_before", "X_before", "mu", "X")
+
+
+def flow_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(v, mu, X) -> (mu, X) after a classical Runge-Kutta step h, where v_i = h / w_i."""
+    n, size = group.dim, packed_size(group)
+
+    def body(ops: Arithmetic, v: Any, mu: Any, X: Any) -> tuple[Any, ...]:
+        def rate(state: Sequence[Scalar], _: int) -> list[Scalar]:
+            mu_rate, X_rate = _rates(group, controls, ops, v, state[:n], state[n:])
+            return [*mu_rate, *X_rate]
+
+        after = _runge_kutta(ops, rate, [*mu, *X])
+        return after[:n], after[n:]
+
+    return Kernel(
+        "flow_step",
+        group.name,
+        (Port("v", (len(controls),)), Port("mu", (n,)), Port("X", (size,))),
+        (Port("mu_next", (n,)), Port("X_next", (size,))),
+        body,
+        formula="a Runge-Kutta step h of mu' = ad*_u mu, X' = X hat(u); v_i = h / w_i",
+    )
+
+
+def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """One column of the variational equations over a Runge-Kutta step h, where v_i = h / w_i.
+
+    (v, mu at the start, in the middle and at the end, psi, xi) -> (psi, xi):
+    psi' = ad*_du mu + ad*_u psi, xi' = du + [xi, u], du_i = psi_i / w_i.
+    """
+    n, m = group.dim, len(controls)
+
+    def body(ops: Arithmetic, v: Any, mu0: Any, mu1: Any, mu2: Any, psi: Any, xi: Any) -> tuple[Any, ...]:
+        nodes = [(_velocity(controls, v, mu), mu) for mu in (mu0, mu1, mu2)]
+
+        def rate(state: Sequence[Scalar], half: int) -> list[Scalar]:
+            (u, mu), psi, xi = nodes[half], state[:n], state[n:]
+            du = _velocity(controls, v, psi)
+            psi_rate = _sum(_coadjoint(group, controls, ops, du, mu), _coadjoint(group, controls, ops, u, psi))
+            xi_rate = bracket_body(group, ops, xi, _spread(group, controls, u))
+            for value, position in zip(du, controls, strict=True):
+                xi_rate[position] = add(value, xi_rate[position])
+            return [*psi_rate, *xi_rate]
+
+        after = _runge_kutta(ops, rate, [*psi, *xi])
+        return after[:n], after[n:]
+
+    return Kernel(
+        "column_step",
+        group.name,
+        (Port("v", (m,)), *(Port(name, (n,)) for name in ("mu0", "mu1", "mu2", "psi", "xi"))),
+        (Port("psi_next", (n,)), Port("xi_next", (n,))),
+        body,
+        formula="a Runge-Kutta step h of psi' = ad*_du mu + ad*_u psi, xi' = du + [xi, u]; v_i = h / w_i",
     )
 
 
@@ -178,6 +237,37 @@ def correction(group: MatrixGroup) -> Kernel:
         body,
         formula="z = x + y + [x, y] / 2 + [x, [x, y]] / 12",
     )
+
+
+def _runge_kutta(
+    ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
+) -> list[Scalar]:
+    """y after one classical step; rate(y, k) is h f at the time k h / 2."""
+    half, sixth = ops.constant(Fraction(1, 2)), ops.constant(Fraction(1, 6))
+    k1 = rate(y, 0)
+    k2 = rate([a + half * k for a, k in zip(y, k1, strict=True)], 1)
+    k3 = rate([a + half * k for a, k in zip(y, k2, strict=True)], 1)
+    k4 = rate(_sum(y, k3), 2)
+    return [
+        a + sixth * (add(first, last) + 2 * add(second, third))
+        for a, first, second, third, last in zip(y, k1, k2, k3, k4, strict=True)
+    ]
+
+
+def _rates(
+    group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, v: Any, mu: Sequence[Scalar], X: Sequence[Scalar]
+) -> tuple[list[Scalar], list[Any]]:
+    """h times the rates of mu and X."""
+    u = _velocity(controls, v, mu)
+    return _coadjoint(group, controls, ops, u, mu), _moving(group, controls, ops, u, X)
+
+
+def _velocity(controls: tuple[int, ...], v: Sequence[Scalar], mu: Sequence[Scalar]) -> list[Scalar]:
+    return [factor * mu[position] for factor, position in zip(v, controls, strict=True)]
+
+
+def _sum(x: Sequence[Scalar], y: Sequence[Scalar]) -> list[Scalar]:
+    return [add(a, b) for a, b in zip(x, y, strict=True)]
 
 
 def _coadjoint(

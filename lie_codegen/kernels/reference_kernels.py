@@ -12,7 +12,6 @@ from lie_codegen.control.reference import TIME, FormulaReference, Reference, Way
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernels.block_solve import add, product
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernels.exponential_map import exp_matrix, jacobian
@@ -22,7 +21,7 @@ from lie_codegen.kernels.group_matrices import matrix_port, velocity_units
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.kernels.linear import Matrix, Vector, matvec
 from lie_codegen.kernels.waypoints import waypoint_reference
-from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, product_exp
+from lie_codegen.kernels.wei_norman_body import WeiNormanData, body_velocity, product_exp
 
 
 def reference_kernel(reference: Reference, name: str = "reference") -> Kernel:
@@ -70,10 +69,7 @@ class ReferenceBody:
         dual = DualArithmetic(ops)
         moving = [_variable(dual, a, b) for a, b in zip(g, rate, strict=True)]
         velocity = [_variable(dual, a, b) for a, b in zip(rate, turn, strict=True)]
-        columns = inverse_columns(dual, self.data, moving)
-        xi: Vector = [0] * reference.group.dim
-        for (i, j), entry in columns.items():
-            xi[i] = add(xi[i], product(entry, velocity[j]))
+        xi = body_velocity(dual, self.data, moving, velocity)
         X = _from_left(ops, reference.start, product_exp(ops, self.data, g))
         return X, [value_of(x, dual.level) for x in xi], [tangent_of(x, 0, dual.level) for x in xi]
 

@@ -20,7 +20,7 @@ def inverse(ops: Arithmetic, matrix: Sequence[Sequence[Scalar]]) -> Matrix:
     if size > 3 and any(isinstance(entry, Complex) for row in matrix for entry in row):
         return _through_reals(ops, matrix)
     sparse = {(i, j): entry for i, row in enumerate(matrix) for j, entry in enumerate(row) if not is_zero(entry)}
-    columns = solve(ops, sparse, [{j: 1} for j in range(size)], size)
+    columns = solve(sparse, [{j: 1} for j in range(size)], size)
     return [[column.get(i, 0) for column in columns] for i in range(size)]
 
 
@@ -68,5 +68,5 @@ def _through_reals(ops: Arithmetic, matrix: Sequence[Sequence[Any]]) -> Matrix:
             ):  # fmt: skip
                 if not is_zero(value):
                     sparse[place] = value
-    columns = solve(ops, sparse, [{j: 1} for j in range(size)], 2 * size)
+    columns = solve(sparse, [{j: 1} for j in range(size)], 2 * size)
     return [[Complex(column.get(i, 0), column.get(i + size, 0)) for column in columns] for i in range(size)]

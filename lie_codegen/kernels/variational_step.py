@@ -154,6 +154,6 @@ def _solved(ops: Arithmetic, real: RealMatrices, metric: sp.MatrixBase, target: 
         rows = [[tangent_of(entry, k, dual.level) for k in range(n)] for entry in value]
         sparse = {(i, k): rows[i][k] for i in range(n) for k in range(n) if not is_zero(rows[i][k])}
         residual = {i: t - value_of(v, dual.level) for i, (t, v) in enumerate(zip(target, value, strict=True))}
-        [change] = solve(ops, sparse, [residual], n)
+        [change] = solve(sparse, [residual], n)
         xi = [x + change.get(i, 0) for i, x in enumerate(xi)]
     return xi

@@ -23,7 +23,8 @@ from lie_codegen.kernels.ring_factors import factors as factors_of
 from lie_codegen.kernels.ring_fractions import quotient
 from lie_codegen.kernels.ring_solve import combination, dense, determinant, inverse_rows
 from lie_codegen.kernels.trigonometric_ring import Element, TrigonometricRing
-from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns, times_vector
+from lie_codegen.kernels.wei_norman_body import WeiNormanData, inverse_columns
+from lie_codegen.kernels.wei_norman_frames import times_vector
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class WeiNorman:
     def _columns(self) -> dict[tuple[int, int], Element]:
         ring = self._ring
         # The printed form asks an arithmetic for constants, sin, cos and exp alone, and those a ring has.
-        columns = inverse_columns(cast(Arithmetic, ring), self.data, ring.coordinates, printed=True)
+        columns = inverse_columns(cast(Arithmetic, ring), self.data, ring.coordinates)
         return {place: ring.ring(value) for place, value in columns.items() if value != 0}
 
     @property

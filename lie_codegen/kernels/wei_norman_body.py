@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import sympy as sp
@@ -20,9 +20,10 @@ from lie_codegen.algebra.adjoint import ad
 from lie_codegen.algebra.exponential import MatrixExponential, matrix_exponential
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernels.block_solve import SparseMatrix, add, product, solve
+from lie_codegen.kernels.block_solve import SparseMatrix, add, product
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.exponential_entries import ExponentialEntries
+from lie_codegen.kernels.wei_norman_frames import Factors, Frames, Step, cheapest_steps, times_vector
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,11 @@ class WeiNormanData:
     def adjoint(self) -> tuple[MatrixExponential, ...]:
         """exp(x ad_{A_k}) for each k."""
         return tuple(matrix_exponential(ad(self.group.algebra, k)) for k in range(self.group.dim))
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """How M(g)^{-1} g' = u is solved."""
+        return cheapest_steps(self.adjoint)
 
     @cached_property
     def defining(self) -> tuple[MatrixExponential, ...]:
@@ -50,10 +56,8 @@ def _real_form(group: MatrixGroup, k: int) -> sp.MatrixBase:
     return sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re))
 
 
-def inverse_columns(
-    ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], *, printed: bool = False
-) -> SparseMatrix:
-    """M(g)^{-1} as (row, column) -> entry."""
+def inverse_columns(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> SparseMatrix:
+    """M(g)^{-1} as (row, column) -> entry, in the textbook form of its entries, for exact display."""
     n = data.group.dim
     exponentials: dict[int, Mapping[tuple[int, int], Scalar]] = {}
     matrix: dict[tuple[int, int], Scalar] = {}
@@ -61,33 +65,46 @@ def inverse_columns(
         column: dict[int, Scalar] = {j: 1}
         for k in range(j + 1, n):
             if k not in exponentials:
-                exponentials[k] = ExponentialEntries(ops, -g[k], data.adjoint[k], printed=printed).sparse()
+                exponentials[k] = ExponentialEntries(ops, -g[k], data.adjoint[k], printed=True).sparse()
             column = times_vector(exponentials[k], column)
         matrix.update({(i, j): value for i, value in column.items()})
     return matrix
 
 
-def times_vector(matrix: Mapping[tuple[int, int], Scalar], vector: Mapping[int, Scalar]) -> dict[int, Scalar]:
-    """The sparse product of a matrix and a vector."""
-    result: dict[int, Scalar] = {}
-    for (i, j), entry in matrix.items():
-        if j in vector:
-            result[i] = add(result.get(i, 0), product(entry, vector[j]))
-    return result
-
-
 def rate(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
     """M(g) u."""
-    n = data.group.dim
-    [solution] = solve(ops, inverse_columns(ops, data, g), [dict(enumerate(u))], n)
-    return [solution.get(i, 0) for i in range(n)]
+    solution = _frames(ops, data, g).solve(data.steps, dict(enumerate(u)))
+    return [solution.get(i, 0) for i in range(data.group.dim)]
 
 
-def matrix(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], *, printed: bool = False) -> list[list[Scalar]]:
+def matrix(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> list[list[Scalar]]:
     """M(g), row by row."""
-    n = data.group.dim
-    columns = solve(ops, inverse_columns(ops, data, g, printed=printed), [{j: 1} for j in range(n)], n)
+    frames, n = _frames(ops, data, g), data.group.dim
+    columns = [frames.solve(data.steps, {j: 1}) for j in range(n)]
     return [[column.get(i, 0) for column in columns] for i in range(n)]
+
+
+def body_velocity(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
+    """u = M(g)^{-1} g': E_n (... E_2 (e_1 g_1') + e_2 g_2' ...) + e_n g_n'."""
+    factors, n = _factors(ops, data, g), data.group.dim
+    velocity: dict[int, Scalar] = {}
+    for k in range(n):
+        velocity = times_vector(factors(k, False), velocity)
+        velocity[k] = add(velocity.get(k, 0), rates[k])
+    return [velocity.get(i, 0) for i in range(n)]
+
+
+def _frames(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> Frames:
+    return Frames(_factors(ops, data, g), data.group.dim)
+
+
+def _factors(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> Factors:
+    @cache
+    def factor(k: int, forward: bool) -> SparseMatrix:
+        exponential = data.adjoint[k]
+        return ExponentialEntries(ops, g[k], exponential if forward else exponential.reflected).sparse()
+
+    return factor
 
 
 def product_exp(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> list[list[Any]]:

@@ -53,7 +53,7 @@ void se2_wei_norman_rate(const double g[3], const double u[3], double g_dot[3])
     const double t3 = u[1];
     const double t4 = u[2];
     const double t5 = t1 * t2;
-    const double t6 = t3 + t5;
+    const double t6 = t5 + t3;
     const double t7 = t0 * t2;
     const double t8 = t4 - t7;
     g_dot[0] = t2;
