@@ -25,6 +25,7 @@ from lie_codegen.errors import CompileError, NoCompilerWarning
 FLAGS = (
     "-std=c99",
     "-fno-math-errno",
+    "-fno-semantic-interposition",
     "-ffp-contract=off",
     "-fno-tree-vectorize",
     "-fno-tree-slp-vectorize",
