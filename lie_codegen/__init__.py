@@ -30,6 +30,7 @@ _FRONT_DOOR = {
     "rotation_from_quaternion": "lie_codegen.groups.conventions",
     "quaternion_from_rotation": "lie_codegen.groups.conventions",
     "PeriodicInput": "lie_codegen.averaging.periodic_input",
+    "SampledInput": "lie_codegen.runtime.sampled_input",
     "average": "lie_codegen.averaging.averaged",
     "order_check": "lie_codegen.studies.order_check",
     "Kernel": "lie_codegen.kernels.kernel",

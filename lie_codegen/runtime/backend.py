@@ -46,6 +46,9 @@ class Backend(Protocol):
     ) -> None:
         """`count` such loops; strides in doubles from one trajectory to the next and from one step to the next."""
 
+    def loop_address(self, *, many: bool) -> int:
+        """Where the C of `scan` (`scan_batch`) is; 0 if there is none."""
+
 
 class _Workspace:
     """Buffers of one call, with their addresses; asking numpy for an address costs more than a kernel."""
@@ -118,6 +121,11 @@ class CtypesBackend:
         lanes, moves = (_strides([pair[side] for pair in strides]) for side in (0, 1))
         self._scan_batch(count, steps, every, _pointers(inputs), lanes, moves, trajectories.ctypes.data)
 
+    def loop_address(self, *, many: bool) -> int:
+        if self._scan is None:
+            return 0
+        return ctypes.cast(self._scan_batch if many else self._scan, ctypes.c_void_p).value or 0
+
 
 class InterpretedBackend:
     """CasADi's interpreter: the same numbers, without a compiler."""
@@ -173,6 +181,9 @@ class InterpretedBackend:
             mine = [row[j * lane :] for row, (lane, _) in zip(rows, strides, strict=True)]
             mine[0] = mine[0][: self._function.numel_in(0)]
             self.scan(steps, every, mine, [step for _, step in strides], trajectories[j])
+
+    def loop_address(self, *, many: bool) -> int:
+        return 0
 
 
 def load_library(path: Path) -> ctypes.CDLL:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -153,6 +154,56 @@ class Compiled:
 
         in_parts(some, count, threads)
         return trajectories
+
+    def drive(
+        self,
+        start: Any,
+        u: Any,
+        *,
+        n: int,
+        h: float,
+        t0: float = 0.0,
+        every: int = 1,
+        at: Mapping[str, float] | None = None,
+        threads: int = 1,
+        **named: Any,
+    ) -> Array:
+        """The loop of `scan` under u(t), evaluated in the loop: for long runs, no memory a step.
+
+        Args:
+            start: the state, or (T, *shape) for T trajectories.
+            u: a PeriodicInput of sines and cosines or of straight pieces, a SampledInput, or a FormulaInput (which may
+                have T trajectories). The jumps of an input in pieces must fall on steps: each step reads one piece.
+            n: number of steps, a multiple of `every`.
+            h: length of a step, also given to a scalar input `h`; a scalar input `t` gets the time of a step.
+            t0: when the first step begins; step k begins at t0 + k h, known to more than double precision.
+            every: steps from one stored state to the next.
+            at: input -> where in a step it reads u, from 0 to 1; u0 at 0, um at 1/2, u1 at 1 by default.
+            threads: over which trajectories are shared out.
+            **named: the other inputs, as for `scan_batch`.
+
+        Returns:
+            (n // every + 1, *shape), with a leading axis T if start or u has one.
+
+        Raises:
+            InputError: u is no formula of time (sample it, and use `scan`), n, every or h does not fit.
+            ShapeError: as for `scan_batch`.
+        """
+        from lie_codegen.runtime.drive import STAGES, Spans, driven_loop
+        from lie_codegen.runtime.formula_input import formula_input
+
+        self._check_loop("drive", n, every)
+        for name, value in (("h", h), ("t0", t0)):
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+                raise InputError(f"{self.name}.drive: {name} is a finite number, given {value!r}")
+        formula = formula_input(u, float(t0), float(t0) + int(n) * float(h))
+        if formula is None:
+            raise InputError(
+                f"{self.name}.drive: u must be a PeriodicInput of sines and cosines or of straight pieces, a SampledInput, "
+                "or a FormulaInput; sample other functions and use scan"
+            )
+        spans = Spans(int(n) // int(every), int(every), None, float(t0), float(h))
+        return driven_loop(self, start, formula, spans, at=at or STAGES, others=named, threads=threads)[0]
 
     def _check_loop(self, form: str, n: Any, every: Any) -> None:
         if not is_step(self.inputs, self.outputs):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,26 +14,39 @@ from lie_codegen.simulation.grid import Grid
 from lie_codegen.simulation.libraries import integrators
 
 Array = NDArray[Any]
+#: (first, last) -> u at the start, the middle and the end of these steps, and their lengths.
+Samples = Callable[[int, int], tuple[Array, Array, Array, Array]]
 
+_BLOCK = 16_384
 _AGREEMENT = 1e-9
 #: log det M above which the chart's edge is reached to rounding.
 _EDGE = 32.0
 _SMALL = 6
 
 
-def follow_chart(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], X: Array) -> Array:
+def follow_chart(group: MatrixGroup, grid: Grid, samples: Samples, X: Array) -> Array:
     """(k, n) coordinates with X(t) = X(t_0) Phi(g(t)), g(t_0) = 0: g' = M(g) u, corrected to X by Newton's method.
 
     Raises:
         ChartError: where the chart ends, naming the time.
     """
-    lib = integrators(group)
-    u0, um, u1 = samples
+    step = integrators(group).wei_norman_step
+    g, inside = np.zeros((len(grid.outputs), group.dim)), np.zeros(len(grid.outputs), dtype=bool)
+    current, still = np.zeros(group.dim), True
+    inside[0] = True
     with np.errstate(all="ignore"):
-        every = lib.wei_norman_step.scan(np.zeros(group.dim), n=grid.steps, every=1, u0=u0, um=um, u1=u1, h=grid.h)
-        inside = np.cumprod(_inside(group, every)).astype(bool)[grid.outputs]
+        for first in range(0, grid.steps, _BLOCK):
+            last = min(first + _BLOCK, grid.steps)
+            u0, um, u1, h = samples(first, last)
+            block = step.scan(current, n=last - first, every=1, u0=u0, um=um, u1=u1, h=h)
+            well = np.logical_and.accumulate(_inside(group, block)) & still
+            here = (grid.outputs > first) & (grid.outputs <= last)
+            g[here], inside[here] = block[grid.outputs[here] - first], well[grid.outputs[here] - first]
+            current, still = block[-1], bool(well[-1])
+            if not still:
+                break
         relative = np.linalg.inv(X[0]) @ X
-        g = newton(group, np.array(every[grid.outputs]), relative)
+        g = newton(group, g, relative)
         off = mismatch(group, g, relative)
     bad = np.flatnonzero(~(inside & (off <= _AGREEMENT * np.maximum(1.0, np.max(np.abs(relative), axis=(1, 2))))))
     if len(bad):

@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.errors import ComputationError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.build import build_kernels
+from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.library import Library
 from lie_codegen.simulation.grid import Grid, refine, sample
-from lie_codegen.simulation.inputs import as_signal
+from lie_codegen.simulation.inputs import Signal, as_signal
+from lie_codegen.simulation.rollout import BLOCK
 from lie_codegen.simulation.second_order import initial_states, split_states
 
 if TYPE_CHECKING:
@@ -83,11 +85,7 @@ def simulate_driven(
     step = _library(group).driven_step
     grid, coarse = Grid.coarse(times, signal.breakpoints), None
     while True:
-        f0, fm, f1 = (np.ascontiguousarray(values) for values in sample(signal, grid, 1.0))
-        run = step.scan(start, n=grid.steps, every=1, inertia=J, inverse=inverse, f0=f0, fm=fm, f1=f1, h=grid.h)
-        states = np.asarray(run)[grid.outputs]
-        xi = np.asarray(run)[:, -group.dim :]
-        move = float(np.max(grid.h * np.linalg.norm(xi[:-1], axis=1))) if np.all(np.isfinite(xi)) else np.inf
+        states, move = _run(step, grid, signal, start, {"inertia": J, "inverse": inverse}, group.dim)
         if coarse is not None and np.isfinite(move):
             estimate = float(np.max(np.abs(states - coarse))) / 15
             scale = max(1.0, float(np.max(np.abs(states))))
@@ -97,3 +95,23 @@ def simulate_driven(
             raise ComputationError(f"simulate_driven({group.name}): the solution left the range of double precision")
         coarse = states if np.isfinite(move) else None
         grid = refine(grid, _MOST_STEPS, group.name)
+
+
+def _run(
+    step: Compiled, grid: Grid, force: Signal, start: Array, inertias: dict[str, Array], n: int
+) -> tuple[Array, float]:
+    """The states at the output times, and the largest |h xi|; infinite where the state is not finite."""
+    kept, move, current = [start[None]], 0.0, start
+    block = BLOCK // grid.parts * grid.parts or grid.parts
+    for first in range(0, grid.steps, block):
+        last = min(first + block, grid.steps)
+        f0, fm, f1, h = sample(force, grid, first, last)
+        three = {name: np.ascontiguousarray(values) for name, values in (("f0", f0), ("fm", fm), ("f1", f1))}
+        run = step.scan(current, n=last - first, every=1, **inertias, **three, h=h)
+        kept.append(run[grid.parts :: grid.parts])
+        current = run[-1]
+        if not np.all(np.isfinite(run)):
+            move = np.inf
+        else:
+            move = max(move, float(np.max(h * np.linalg.norm(run[:-1, -n:], axis=1))))
+    return np.concatenate(kept)[grid.at], move

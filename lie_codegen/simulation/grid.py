@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.errors import ComputationError
+from lie_codegen.runtime.drive import Spans
 from lie_codegen.simulation.inputs import Signal
 
 Array = NDArray[np.float64]
@@ -44,49 +45,44 @@ class Grid:
         return (len(self.knots) - 1) * self.parts
 
     @property
-    def h(self) -> Array:
-        """(steps,) step lengths."""
-        return np.repeat(np.diff(self.knots) / self.parts, self.parts)
+    def spans(self) -> Spans:
+        """As the loops take it."""
+        return Spans(len(self.knots) - 1, self.parts, self.knots)
+
+    @property
+    def largest_step(self) -> float:
+        """The longest step."""
+        return float(np.max(np.diff(self.knots))) / self.parts
 
     @property
     def outputs(self) -> NDArray[np.int64]:
         """Positions of the output times among the steps."""
         return self.at * self.parts
 
-    def starts(self) -> Array:
-        """(steps,) left ends."""
-        fractions = np.arange(self.parts) / self.parts
-        return (self.knots[:-1, None] + np.diff(self.knots)[:, None] * fractions).ravel()
 
-    def largest_move(self, samples: tuple[Array, Array, Array]) -> float:
-        """max |h u| over the grid, Euclidean in the basis."""
-        h = self.h
-        return float(max(np.max(h * np.linalg.norm(values, axis=1), initial=0.0) for values in samples))
-
-
-def refine(grid: Grid, most: int, name: str) -> Grid:
-    """The grid with its steps halved.
+def refine(grid: Grid, most: int, name: str, factor: int = 2) -> Grid:
+    """The grid with its steps divided by `factor`.
 
     Raises:
         ComputationError: beyond `most` steps.
     """
-    finer = Grid(grid.knots, 2 * grid.parts, grid.at)
+    finer = Grid(grid.knots, factor * grid.parts, grid.at)
     if finer.steps > most:
         raise ComputationError(
-            f"simulate({name}): {most} steps do not reach the tolerance; loosen `tolerance`, shorten t, or name the "
-            "times at which u is not smooth in an attribute `breakpoints` of u"
+            f"simulate({name}): {grid.steps} steps do not reach the tolerance, and {finer.steps} are more than the {most} "
+            "that are taken; loosen `tolerance`, shorten t, or name the times at which u is not smooth in an attribute "
+            "`breakpoints` of u"
         )
     return finer
 
 
-def sample(signal: Signal, grid: Grid, eps: float) -> tuple[Array, Array, Array]:
-    """eps u at the start, the middle and the end of each step, (steps, n) each.
+def sample(signal: Signal, grid: Grid, first: int, last: int) -> tuple[Array, Array, Array, Array]:
+    """u at the start, the middle and the end of steps first .. last - 1, (steps, n) each, and the lengths of the steps.
 
     At a breakpoint u is read from inside the step, a hair (1e-13 of the step) away from the jump.
     """
-    a = grid.starts()
-    h = grid.h
+    a, h = grid.spans.steps(first, last)
     if len(signal.breakpoints):
         hair = 1e-13 * h + 4 * np.spacing(np.maximum(np.abs(a), np.abs(a + h)))
-        return eps * signal(a + hair), eps * signal(a + h / 2), eps * signal(a + h - hair)
-    return eps * signal(a), eps * signal(a + h / 2), eps * signal(a + h)
+        return signal(a + hair), signal(a + h / 2), signal(a + h - hair), h
+    return signal(a), signal(a + h / 2), signal(a + h), h

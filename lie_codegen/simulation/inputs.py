@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,16 +11,26 @@ from numpy.typing import NDArray
 
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
 class Signal:
-    """u(t) on (n,) components, vectorised over t, with the times at which it is not smooth."""
+    """u(t) on (n,) components, vectorised over t.
 
-    def __init__(self, evaluate: Callable[[Array], Array], breakpoints: Array) -> None:
-        self.evaluate = evaluate
-        self.breakpoints = breakpoints
+    Attributes:
+        dim: n.
+        evaluate: (k,) times -> (k, n).
+        breakpoints: the times at which it is not smooth.
+        formula: what compiled loops evaluate themselves, or None.
+    """
+
+    dim: int
+    evaluate: Callable[[Array], Array]
+    breakpoints: Array
+    formula: FormulaInput | None = None
 
     def __call__(self, t: Array) -> Array:
         """(k,) times -> (k, n)."""
@@ -30,27 +41,42 @@ def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
     """A Signal from what the caller gave.
 
     Args:
-        u: a callable u(t) -> (n,) (or vectorised: (k,) -> (k, n)), with an optional attribute `breakpoints`;
-            an (n,) constant; or (len(t), n) samples at the times t, joined by straight lines.
+        u: a PeriodicInput, a SampledInput; a callable u(t) -> (n,) (or vectorised: (k,) -> (k, n)), with an optional
+            attribute `breakpoints`; an (n,) constant; or (len(t), n) samples at the times t, joined by straight lines.
 
     Raises:
         ShapeError: naming the shape that was expected.
         NotFiniteError: if u holds NaN or infinity.
     """
+    formula = formula_input(u, float(t[0]), float(t[-1]))
+    if formula is not None:
+        if formula.dim != group.dim:
+            raise ShapeError(f"simulate({group.name}): u has {formula.dim} components; the algebra has {group.dim}")
+        return _of_formula(formula, t)
     if callable(u):
-        return Signal(_vectorised(group, u, t), _breakpoints(u, t))
+        return Signal(group.dim, _vectorised(group, u, t), _breakpoints(u, t))
     values = _numbers(group, u, "u")
     if not np.all(np.isfinite(values)):
         raise NotFiniteError(f"simulate({group.name}): u holds NaN or infinity")
     if values.shape == (group.dim,):
-        return Signal(lambda s: np.broadcast_to(values, (len(s), group.dim)), np.empty(0))
+        return _of_formula(fourier_input([0.0], values[None], np.zeros((1, group.dim))), t)
     if values.shape == (len(t), group.dim):
-        columns = values.T
-        return Signal(lambda s: np.stack([np.interp(s, t, column) for column in columns], axis=-1), t)
+        return _of_formula(lines_input(t, values[:-1], values[1:]), t)
     raise ShapeError(
         f"simulate({group.name}): u has shape {values.shape}; give a function of t, a constant ({group.dim},), or "
         f"samples ({len(t)}, {group.dim}) at the times t"
     )
+
+
+def _of_formula(formula: FormulaInput, t: Array) -> Signal:
+    """The formula; by numpy, of the first trajectory, where Python asks for values."""
+    one = formula if formula.trajectories is None else formula.trajectory(0)
+
+    def evaluate(s: Array) -> Array:
+        return one.values(s, np.zeros_like(s), np.zeros(1))[:, 0]
+
+    inside = formula.breakpoints
+    return Signal(formula.dim, evaluate, inside[(inside >= t[0]) & (inside <= t[-1])], formula)
 
 
 def _breakpoints(u: Any, t: Array) -> Array:

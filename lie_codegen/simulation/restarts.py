@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.errors import ChartError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.simulation.chart import newton
+from lie_codegen.simulation.chart import Samples, newton
 from lie_codegen.simulation.grid import Grid
 from lie_codegen.simulation.libraries import integrators
 
@@ -45,58 +45,73 @@ class Chart:
     reason: str
 
 
-def restarted_charts(
-    group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], states: Array
-) -> tuple[Chart, ...]:
+def restarted_charts(group: MatrixGroup, grid: Grid, samples: Samples, X: Array) -> tuple[Chart, ...]:
     """The charts that cover a trajectory.
 
     Args:
         group: the group.
         grid: the time grid.
-        samples: u at the start, middle and end of each step.
-        states: (steps + 1, d, d) the trajectory at every step.
+        samples: u at the steps.
+        X: (k, d, d) the trajectory at the output times.
 
     Raises:
         ChartError: if a single step crosses a whole chart.
     """
-    times = np.append(grid.starts(), grid.knots[-1])
-    charts = []
-    begin = 0
+    charts: list[Chart] = []
+    begin, origin = 0, X[0]
     while begin < grid.steps:
-        g, reason = _until_edge(group, grid, samples, begin)
-        last = begin + len(g) - 1
-        if last == begin:
-            raise ChartError(
-                f"{group.name}: one step at t = {times[begin]:.6g} crosses a whole chart; lower `tolerance`"
-            )
-        outputs = grid.outputs[(grid.outputs >= begin) & (grid.outputs <= last)]
-        relative = np.linalg.inv(states[begin]) @ states[outputs]
-        inside = newton(group, g[outputs - begin], relative) if len(outputs) else np.empty((0, group.dim))
-        charts.append(Chart(float(times[begin]), float(times[last]), states[begin], times[outputs], inside, reason))
-        begin = last
+        piece = _until_edge(group, grid, samples, begin, origin)
+        start, end = _time(grid, begin), _time(grid, piece.last)
+        if piece.last == begin:
+            raise ChartError(f"{group.name}: one step at t = {start:.6g} crosses a whole chart; lower `tolerance`")
+        here = np.flatnonzero((grid.outputs >= begin) & (grid.outputs <= piece.last))
+        relative = np.linalg.inv(origin) @ X[here]
+        inside = newton(group, piece.g, relative) if len(here) else np.empty((0, group.dim))
+        charts.append(Chart(start, end, origin, grid.knots[grid.at[here]], inside, piece.reason))
+        begin, origin = piece.last, piece.end
     return tuple(charts)
 
 
-def _until_edge(group: MatrixGroup, grid: Grid, samples: tuple[Array, Array, Array], begin: int) -> tuple[Array, str]:
-    """Coordinates at the steps from `begin` to the last one well inside the chart, and why it is the last."""
+@dataclass(frozen=True)
+class _Piece:
+    """One chart: its last step, X there, the coordinates at the output times within, why it ends."""
+
+    last: int
+    end: Array
+    g: Array
+    reason: str
+
+
+def _time(grid: Grid, step: int) -> float:
+    """When a step begins."""
+    span, inside = divmod(step, grid.parts)
+    if inside == 0:
+        return float(grid.knots[span])
+    return float(grid.spans.steps(step, step + 1)[0][0])
+
+
+def _until_edge(group: MatrixGroup, grid: Grid, samples: Samples, begin: int, origin: Array) -> _Piece:
+    """The steps from `begin` to the last one well inside the chart."""
     lib = integrators(group)
-    pieces = [np.zeros((1, group.dim))]
-    h = grid.h
-    position = begin
+    g, X, position = np.zeros(group.dim), origin, begin
+    kept = [np.zeros((int(np.isin(begin, grid.outputs)), group.dim))]
     while position < grid.steps:
         stop = min(position + _BLOCK, grid.steps)
-        u0, um, u1 = (values[position:stop] for values in samples)
+        u0, um, u1, h = samples(position, stop)
+        inputs = {"u0": u0, "um": um, "u1": u1, "h": h}
         with np.errstate(all="ignore"):
-            block = lib.wei_norman_step.scan(
-                pieces[-1][-1], n=stop - position, every=1, u0=u0, um=um, u1=u1, h=h[position:stop]
-            )[1:]
-        wall, growth = _edges(group, block)
+            block = lib.wei_norman_step.scan(g, n=stop - position, every=1, **inputs)
+        wall, growth = _edges(group, block[1:])
         out = np.flatnonzero(wall | growth)
+        count = int(out[0]) if len(out) else stop - position
+        here = grid.outputs[(grid.outputs > position) & (grid.outputs <= position + count)]
+        kept.append(block[here - position])
+        X = lib.rkmk4_step.scan(X, n=stop - position, every=1, **inputs)[count]
+        g = block[count]
         if len(out):
-            return np.concatenate([*pieces, block[: out[0]]]), "wall" if wall[out[0]] else "growth"
-        pieces.append(block)
+            return _Piece(position + count, X, np.concatenate(kept), "wall" if wall[out[0]] else "growth")
         position = stop
-    return np.concatenate(pieces), "end"
+    return _Piece(position, X, np.concatenate(kept), "end")
 
 
 def _edges(group: MatrixGroup, g: Array) -> tuple[Array, Array]:

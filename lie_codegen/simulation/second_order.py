@@ -164,7 +164,7 @@ def _run(lib: Library, start: Array, times: Array, every: int, many: bool) -> Ar
         stages = _stages(lib, times[0] + h * first, h, count)
         clock = times[0] + h * (first + np.arange(count))
         if many:
-            states.append(_advance_all(lib, states[-1][-1], clock, h, stages, every))
+            states.append(_advance_all(lib, np.ascontiguousarray(states[-1][-1]), clock, h, stages, every))
         else:
             run = lib.second_order_step.scan(states[-1][-1], n=count, every=every, t=clock, h=h, **stages)
             states.append(np.asarray(run)[1:])
@@ -186,13 +186,9 @@ def _stages(lib: Library, start: float, h: float, count: int) -> dict[str, Array
 
 def _advance_all(lib: Library, current: Array, clock: Array, h: float, stages: dict[str, Array], every: int) -> Array:
     """(count / every, N, m) states of many runs."""
-    kept = np.empty((len(clock) // every, *current.shape))
-    for index, t in enumerate(clock):
-        now = {name: values[index] for name, values in stages.items()}
-        current = lib.second_order_step.batch(state=current, t=float(t), h=h, **now)
-        if (index + 1) % every == 0:
-            kept[(index + 1) // every - 1] = current
-    return kept
+    shared: dict[str, Any] = {name: values[None] for name, values in stages.items()}
+    runs = lib.second_order_step.scan_batch(current, n=len(clock), every=every, t=clock[None], h=h, **shared)
+    return np.ascontiguousarray(np.moveaxis(runs[:, 1:], 0, 1))
 
 
 def _refined(
