@@ -15,6 +15,8 @@ from test_codegen_tape import every_operation
 from lie_codegen.codegen.lanes import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, SLOW_FORMS
 from lie_codegen.codegen.opcodes import C99_FORMS
 from lie_codegen.codegen.package import render_library
+from lie_codegen.codegen.reciprocals import with_shared_reciprocals
+from lie_codegen.codegen.tape import tape_of
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.runtime.backend import CtypesBackend, load_library
@@ -223,6 +225,42 @@ def test_every_operation_of_the_table_has_a_lane_form() -> None:
     forms = (LANE_FORMS, MASK_FORMS, CHOICE_FORMS, SLOW_FORMS)
     assert {op for form in forms for op in form} == set(C99_FORMS)
     assert sum(len(form) for form in forms) == len(C99_FORMS)
+
+
+def test_divisions_that_share_a_divisor_are_one() -> None:
+    def body(ops: Any, x: Any) -> tuple[Any, ...]:
+        square = x[0] * x[0] + 1
+        return ([x[1] / square, x[2] / ops.sqrt(square), (x[1] + x[2]) / square, x[0] / x[1]],)
+
+    kernel = Kernel("shares", "toy", (Port("x", (3,)),), (Port("y", (4,)),), body)
+    before, after = tape_of(kernel), with_shared_reciprocals(tape_of(kernel))
+    count = {op: sum(s.op == op for s in after.statements) for op in ("DIV", "INV")}
+    assert sum(s.op == "DIV" for s in before.statements) == 4
+    assert count == {"DIV": 1, "INV": 1}
+    x = np.random.default_rng(0).normal(size=(100, 3))
+    lib = build_kernels(lambda: (kernel,))
+    np.testing.assert_allclose(lib.shares.batch(x), [lib.shares(row) for row in x], rtol=6e-16)
+
+
+@pytest.mark.parametrize("shift", [0, 1, 2])
+def test_results_beyond_the_caches_are_the_same(shift: int) -> None:
+    """Streaming stores serve arrays of 16 MiB and more that begin at 16 bytes; the others do not use them."""
+
+    def body(ops: Any, x: Any) -> tuple[Any, ...]:
+        return [ops.sin(x), x, 2 * x, x * x, 1], [x * x * x, x + 1]
+
+    kernel = Kernel("stream", "toy", (Port("x", ()),), (Port("y", (5,)), Port("z", (2,))), body)
+    stream = build_kernels(lambda: (kernel,)).stream
+    count = 2**21 // 2 + 13
+    x = np.random.default_rng(0).normal(size=count)
+    y, z = (np.full(count * size + shift + 1, np.nan) for size in (5, 2))
+    out = (y[shift:-1].reshape(count, 5), z[shift:-1].reshape(count, 2))
+    stream.batch(x, out=out)
+    assert all(np.isnan(each[-1]) and np.isnan(each[:shift]).all() for each in (y, z))
+    for start in (0, 1000, count - 50):
+        for whole, part in zip(out, stream.batch(x[start : start + 50]), strict=True):
+            np.testing.assert_array_equal(whole[start : start + 50], part)
+    np.testing.assert_array_equal(out[1], np.stack([x * x * x, x + 1], axis=1))
 
 
 @pytest.fixture

@@ -103,7 +103,9 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     _check(namespace, kernels)
     tapes = [tape_of(kernel) for kernel in kernels]
     view = package_view(namespace, kernels, tapes, PackageMetadata())
-    bodies = [lane_body(tape, len(kernel.inputs)) for kernel, tape in zip(kernels, tapes, strict=True)]
+    bodies = [
+        lane_body(tape, [port.size for port in kernel.inputs]) for kernel, tape in zip(kernels, tapes, strict=True)
+    ]
     files = {
         f"{namespace}.h": render("header.h.jinja", package=view),
         f"{namespace}.c": render("source.c.jinja", package=view),

@@ -157,11 +157,12 @@ def wei_norman_step(group: MatrixGroup) -> Kernel:
         def moved(k: Sequence[Scalar], factor: Scalar) -> list[Scalar]:
             return [a + factor * b for a, b in zip(g, k, strict=True)]
 
+        half, sixth = h * 0.5, h * (1 / 6)
         k1 = rate(ops, data, g, u0)
-        k2 = rate(ops, data, moved(k1, h / 2), um)
-        k3 = rate(ops, data, moved(k2, h / 2), um)
+        k2 = rate(ops, data, moved(k1, half), um)
+        k3 = rate(ops, data, moved(k2, half), um)
         k4 = rate(ops, data, moved(k3, h), u1)
-        return ([x + h / 6 * (a + 2 * (b + c) + e) for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
+        return ([x + sixth * (a + 2 * (b + c) + e) for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
 
     return Kernel(
         name="wei_norman_step",
