@@ -1,10 +1,11 @@
-"""method="area_rule" and "loops": controls from the areas of loops, then retuned to hit the target exactly."""
+"""method="area_rule": Fourier controls of least energy by the averaged endpoint, then retuned to hit the target exactly."""
 
 from __future__ import annotations
 
 import operator
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from lie_codegen.errors import SteeringError, SteeringInputError
-from lie_codegen.steering.averaged_end import averaged_end
+from lie_codegen.steering.averaged_end import TABULATED, averaged_end
+from lie_codegen.steering.chain import Chain
 from lie_codegen.steering.constraints import limits
 from lie_codegen.steering.extremals import SOLVED
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.fourier import Family
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.seeds import coordinates, seed_controls
-from lie_codegen.steering.segments import Chain
 from lie_codegen.steering.shooting import shooter
 from lie_codegen.steering.task import Task
 
@@ -30,6 +31,9 @@ _SHARP = 1e-13
 _FINE = 8
 _TRIED = 3
 _MOST_ORDER = 8
+_MOMENTS = 2
+_AGREEING = 3
+_EQUAL = 1e-6
 
 
 def area_rule(
@@ -103,54 +107,39 @@ def area_rule(
     return finish(task, "area_rule", _controls(task, family, best), details, seconds, solved=end, otherwise=otherwise)
 
 
-def loops(task: Task, *, exact: bool = True) -> Plan:
-    """A straight part, then a circle for each pair of controls whose area is needed, one after the other.
-
-    To second order X(T) = exp(x) prod_p exp(a_p [A_i, A_j]); with `exact` the straight part and the areas are solved for so that
-    the true endpoint is the target (Newton's method, derivatives by differences of the true flow).
-
-    Raises:
-        SteeringInputError: controls that need brackets of brackets.
-        SteeringError: Newton's method does not converge.
-    """
-    started = time.perf_counter()
-    if task.report.depth > 1:
-        raise SteeringInputError(
-            f"steer({task.group.name}): loops make single brackets, these controls need {task.report.depth} "
-            f"(growth vector {task.report.growth}); use method='optimal'"
-        )
-    chain = Chain.towards(task.group, task.controls, coordinates(task.group, task.target))
-    if exact:
-        chain = chain.retuned(task.target)
-    details = {
-        "winner": "a straight part and loops" + (", retuned" if exact else ""),
-        "straight": chain.straight,
-        "areas": {f"{task.group.labels[i]}, {task.group.labels[j]}": area for (i, j), area in chain.loops()},
-    }
-    seconds = {"solve": time.perf_counter() - started}
-    end = Status.SOLVED if exact else Status.APPROXIMATE
-    otherwise = Status.NOT_CONVERGED if exact else Status.APPROXIMATE
-    return finish(task, "loops", chain.controls_over(task.duration), details, seconds, solved=end, otherwise=otherwise)
-
-
 def _averaged_members(
     task: Task, family: Family, x: Array, order: int, first: list[Array], low: Array, high: Array
 ) -> tuple[list[Array], float]:
-    """The members that meet x by averaging, cheapest first, without repetitions of equal energy; the least energy."""
+    """The members that meet x by averaging, cheapest first, without repetitions of equal energy; the least energy.
+
+    No more guesses are tried once enough of them led to the cheapest.
+    """
     if task.report.depth >= order:
         return [], np.inf
-    deep = task.report.depth > 1
-    if order > 2 and not deep:
+    if task.report.depth == _MOMENTS:
+        first = [_superposed(task, family, x), *first]
+    elif order > 2:
         first = _averaged_members(task, family, x, 2, first, low, high)[0][:_TRIED] or first
+    enough = _AGREEING if order <= TABULATED else 1
     found: list[Array] = []
     for guess in first:
         c = _least_energy(family, guess, lambda c: _averaged_gap(family, x, order, c), low, high)
         if np.max(np.abs(_averaged_gap(family, x, order, c)[0])) < 1e-8:
             found.append(c)
-            if deep:  # each takes seconds
-                break
+        energies = np.array([_energy(family, each) for each in found])
+        if np.sum(energies < (1 + _EQUAL) * np.min(energies, initial=np.inf)) >= enough:
+            break
     found.sort(key=lambda c: _energy(family, c))
-    return found, _energy(family, found[0]) if found else np.inf
+    repeated = [_energy(family, b) < (1 + _EQUAL) * _energy(family, a) for a, b in pairwise(found)]
+    distinct = [c for c, again in zip(found, [False, *repeated], strict=False) if not again]
+    return distinct, _energy(family, found[0]) if found else np.inf
+
+
+def _superposed(task: Task, family: Family, x: Array) -> Array:
+    """The segments of the chain of `loops`, all at once: the closed form as a first guess."""
+    s = np.linspace(0, 1, _SAMPLES)
+    chain = Chain.towards(task.group, task.controls, x)
+    return family.fitted(np.sum([segment.velocity(size, s) for segment, size in chain.parts()], axis=0), s)
 
 
 def _optimum(task: Task, s: Array, otherwise: Array) -> list[Array]:
@@ -182,7 +171,8 @@ def _least_energy(
 ) -> Array:
     """Sequential quadratic programming with exact gradients."""
     weights = family.energy_weights
-    constraints: list[dict[str, Any]] = [{"type": "eq", "fun": lambda c: gap(c)[0], "jac": lambda c: gap(c)[1]}]
+    last = _Last(gap)
+    constraints: list[dict[str, Any]] = [{"type": "eq", "fun": lambda c: last(c)[0], "jac": lambda c: last(c)[1]}]
     waves = family.waves(np.linspace(0, 1, _SAMPLES))
     for number, (least, most) in enumerate(zip(low, high, strict=True)):
         if np.isfinite(least) or np.isfinite(most):
@@ -203,6 +193,20 @@ def _least_energy(
         options={"maxiter": 100, "ftol": 1e-12},
     )
     return np.asarray(result.x)
+
+
+class _Last:
+    """A function of c that remembers its last value: SLSQP asks for value and derivative one after the other."""
+
+    def __init__(self, function: Callable[[Array], tuple[Array, Array]]) -> None:
+        self._function = function
+        self._c = np.zeros(0)
+        self._value = (self._c, self._c)
+
+    def __call__(self, c: Array) -> tuple[Array, Array]:
+        if not np.array_equal(c, self._c):
+            self._c, self._value = c.copy(), self._function(c)
+        return self._value
 
 
 def _restored(family: Family, task: Task, c: Array) -> tuple[Array, float]:

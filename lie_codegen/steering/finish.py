@@ -45,14 +45,16 @@ def finish(
     otherwise: Status,
     drift: Array | None = None,
     end: Array | None = None,
+    accuracy: float = 1e-11,
 ) -> Plan:
     """Simulates the true system under u, and the drift if there is one, and reports where it ends.
 
-    Where u is not a velocity the caller has simulated, and says where the true system ends.
+    Where u is not a velocity the caller has simulated, and says where the true system ends. `accuracy` is of the simulation.
     """
     started = time.perf_counter()
     if end is None:
-        end = simulate(task.group, u if drift is None else u.plus(drift), t=[0.0, task.duration]).X[-1]
+        velocity = u if drift is None else u.plus(drift)
+        end = simulate(task.group, velocity, t=[0.0, task.duration], tolerance=accuracy).X[-1]
     error = distance(task.group, task.target, end)
     return Plan(
         group=task.group,

@@ -5,6 +5,10 @@ Two controls i, j whose bracket is [A_i, A_j] = c A_k. With desired coordinates 
     phase 2  q periods, out of phase       each period encloses an area that moves g_k by c * area
     phase 3  quarter period, in phase      the controls come to rest
     phase 4  half period, in phase         undoes what phase 3 moved
+Form "product" takes gd as coordinates of the second kind, (60): X(T) ~ exp(gd_i A_i) exp(gd_j A_j) exp(gd_k A_k) for
+controls ordered so. Form "single" is the single-exponential design (66), X(T) ~ exp(gd_i A_i + gd_j A_j + gd_k A_k): gd is
+the target's logarithm (on SO(3) its Euler parameters, (58)), the manoeuvre the same. Theorem 4 is printed for X(0) = I only;
+exp(Z_0 + ...) holds from X(0) = exp(Z_0), Z_0 = O(eps), too, which is what phase 2 needs; phase 1 is then exact.
 (62)-(65) as printed ask for 0 < psi < pi/2; right is sign(tan psi) = sign(c gd_i gd_j gd_k), with
 q = gd_k / (pi c gd_i gd_j tan psi) a positive integer: choose q, then psi = atan(gd_k / (pi q c gd_i gd_j)).
 """
@@ -20,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
-from lie_codegen.simulation.metric import second_kind
+from lie_codegen.simulation.metric import matrix_log, second_kind
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
@@ -28,28 +32,32 @@ from lie_codegen.steering.task import Task
 Array = NDArray[np.float64]
 
 _NEGLIGIBLE = 1e-12
+_ON_GROUP = 1e-8
+_FORMS = {"product": "coordinates of the second kind", "single": "coordinates of the logarithm"}
 
 
-def four_phase(task: Task, *, q: int | None = None) -> Plan:
+def four_phase(task: Task, *, q: int | None = None, form: str = "product") -> Plan:
     """The four-phase manoeuvre.
 
     Args:
-        task: two controls whose bracket is a multiple of one basis element; the target's coordinates of the second kind
-            must vanish on all others.
+        task: two controls whose bracket is a multiple of one basis element; the target's coordinates must vanish on all
+            others.
         q: number of area-making periods; None takes the integer next to |gd_k / (pi c gd_i gd_j)|, so that psi is near
             45 degrees. More periods are more accurate and cost more energy.
+        form: "product", coordinates of the second kind, or "single", the logarithm.
 
     Raises:
         SteeringInputError: where the scheme does not apply, with what to do instead.
     """
     started = time.perf_counter()
     i, j, k, constant = _bracket(task)
-    gd = _desired(task, (i, j, k))
+    gd = _desired(task, (i, j, k), form)
     q = _periods(task, q, gd[k], constant * gd[i] * gd[j])
     psi = math.atan(gd[k] / (math.pi * q * constant * gd[i] * gd[j])) if gd[k] else 0.0
     period = task.duration / (q + 1)
     u = _controls(task, (i, j), (gd[i], gd[j]), psi, q, period)
     details = {
+        "form": form,
         "gd": tuple(float(value) for value in gd),
         "q": q,
         "psi": psi,
@@ -63,9 +71,9 @@ def four_phase(task: Task, *, q: int | None = None) -> Plan:
 
 
 def average(plan: Plan, t: Array) -> Array:
-    """(k, n) the second-order average g-double-bar of a four-phase plan: eps u-tilde, and the area as a ramp.
+    """(k, n) the second-order average of a four-phase plan: eps u-tilde, and the area as a ramp.
 
-    Theorem 3 and Corollary 2 of the paper, interval by interval.
+    g-double-bar of Theorem 3 and Corollary 2 of the paper, interval by interval; of form "single" Z-double-bar of Theorem 4.
     """
     info = plan.details
     i, j, k, _ = _bracket_of(plan)
@@ -116,18 +124,30 @@ def _bracket(task: Task) -> tuple[int, int, int, float]:
     return i, j, k, float(value)
 
 
-def _desired(task: Task, allowed: tuple[int, ...]) -> Any:
-    try:
-        gd = second_kind(task.group, task.target)
-    except NotOnGroupError as error:
-        raise SteeringInputError(f"four_phase: {error}; use method='optimal'") from None
+def _desired(task: Task, allowed: tuple[int, ...], form: str) -> Any:
+    gd = _coordinates(task, form)
     others = [m for m in range(task.group.dim) if m not in allowed and abs(gd[m]) > _NEGLIGIBLE]
     if others:
         names = ", ".join(f"{task.group.labels[m]} = {gd[m]:.6g}" for m in others)
-        raise SteeringInputError(
-            f"four_phase cannot move {names} (coordinates of the second kind of the target); use method='optimal'"
-        )
+        raise SteeringInputError(f"four_phase cannot move {names} ({_FORMS[form]} of the target); use method='optimal'")
     return gd
+
+
+def _coordinates(task: Task, form: str) -> Array:
+    """Of the target, of the kind the form asks for."""
+    if form not in _FORMS:
+        raise SteeringInputError(f"four_phase: form must be {' or '.join(_FORMS)}, got {form!r}")
+    if form == "single":
+        x, off = matrix_log(task.group, task.target)
+        if off > _ON_GROUP:
+            raise SteeringInputError(
+                'four_phase: the target has no logarithm near by; use form="product" or method="optimal"'
+            )
+        return x
+    try:
+        return second_kind(task.group, task.target)
+    except NotOnGroupError as error:
+        raise SteeringInputError(f"four_phase: {error}; use method='optimal'") from None
 
 
 def _periods(task: Task, q: int | None, wanted: float, loop: float) -> int:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.simulation.libraries import integrators
+from lie_codegen.steering.endpoint import flow_end
 
 Array = NDArray[Any]
 
@@ -87,30 +87,10 @@ class Family:
 
         The endpoint is good to about 1e-9, with refine=8 to 1e-13.
         """
-        group, n = self.group, self.group.dim
-        count = (
-            refine
-            * _STEPS_A_HARMONIC
-            * (1 + self.harmonics)
-            * max(1, int(np.sqrt(np.sum(self.energy_weights * c * c)) / 8))
-        )
-        t = np.linspace(0, 1, 2 * count + 1)
-        u = np.zeros((2 * count + 1, n))
-        u[:, list(self.controls)] = self.evaluate(c, t)
-        step = integrators(group).rkmk4_step
-        start = np.eye(group.degree, dtype=complex if group.is_complex else float)
-        X = step.scan(start, n=count, u0=u[:-2:2].copy(), um=u[1::2].copy(), u1=u[2::2].copy(), h=1.0 / count)
-        X = X[::refine]
-        count //= refine
-        u_times = t[:: 2 * refine]
-        relative = np.linalg.solve(X[-1], X)
-        moved = relative[:, None] @ group.basis[list(self.controls)] @ np.linalg.inv(relative)[:, None]
-        carried = group.project(moved)
-        simpson = np.full(count + 1, 2.0)
-        simpson[1::2] = 4.0
-        simpson[[0, -1]] = 1.0
-        J = np.einsum("t,tin,tp->nip", simpson / (3 * count), carried, self.waves(u_times))
-        return np.asarray(X[-1]), J.reshape(n, -1)
+        steps = _STEPS_A_HARMONIC * (1 + self.harmonics)
+        steps *= max(1, int(np.sqrt(np.sum(self.energy_weights * c * c)) / 8))
+        X, s, carried = flow_end(self.group, self.controls, lambda s: self.evaluate(c, s), steps, refine)
+        return X, np.einsum("kin,kp->nip", carried, self.waves(s)).reshape(self.group.dim, -1)
 
     def fitted(self, u: Array, t: Array) -> Array:
         """The member nearest to samples u, (k, m), on a uniform grid t of [0, 1]."""

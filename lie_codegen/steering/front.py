@@ -32,9 +32,10 @@ def steer(
         controls: labels (or positions) of the actuated basis elements.
         duration: seconds.
         method: "auto": "transcription" if an option asks for it (bounds, obstacles ...), else "optimal";
-            "four_phase": closed form, section 5.2 of TR 93-59; two controls;
+            "four_phase": closed form, section 5.2 of TR 93-59; two controls; form="single" for its single-exponential design (66);
+            "circle": two controls that turn at a constant rate, the least energy within the area rule, retuned; three dimensions;
             "area_rule": Fourier controls of least energy within the averaged model, then retuned to hit the target exactly;
-            "loops": a straight part and one loop for each bracket, one after the other;
+            "loops": a straight part, a loop for each bracket, a figure of eight for each bracket of brackets, in turn, retuned;
             "optimal": minimum energy, exact extremals;
             "transcription": bounds, rates, obstacles, drift, torques, via points, periodic controls, minimum time;
             "feedback": in steps, each planned from the measured state.

@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lie_codegen.errors import SteeringInputError
-from lie_codegen.steering.area_rule import area_rule, loops
+from lie_codegen.steering.area_rule import area_rule
+from lie_codegen.steering.circle import circle
 from lie_codegen.steering.four_phase import four_phase
+from lie_codegen.steering.loops import loops
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import Task
@@ -17,6 +19,7 @@ Method = Callable[..., Plan]
 
 OPEN_LOOP: Mapping[str, Method] = {
     "four_phase": four_phase,
+    "circle": circle,
     "area_rule": area_rule,
     "loops": loops,
     "optimal": optimal,

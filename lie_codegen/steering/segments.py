@@ -1,128 +1,152 @@
-"""A chain of manoeuvres: a straight part, then one circle for each pair of controls, in turn."""
+"""The elementary manoeuvres of a chain: straight, a loop for a bracket, a figure of eight for a bracket of brackets.
+
+With the integrals U~ = int u of a closed manoeuvre, averaging over it gives (Leonard and Krishnaprasad, TR 93-59, Corollary 2,
+and its next order, the area-moment rule)
+
+    log X(1) = 1/2 int [U~, u] + 1/3 int [U~, [U~, u]] + ...
+
+A circle of area a in the plane of A_i, A_j moves by a [A_i, A_j]. In-phase harmonics 1 : 2, U~ = alpha sin(2 pi s) a
++ beta sin(4 pi s) b, draw a figure of eight: no area, so nothing to second order, and
+
+    1/3 int [U~, [U~, u]] = -(pi / 2) alpha^2 beta [a, [a, b]] = M [a, [a, b]].
+
+The energy is 2 pi^2 (alpha^2 + 4 beta^2), least at alpha^2 = 8 beta^2, |beta| = (|M| / (4 pi))^(1/3): 24 pi^2 beta^2.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lie_codegen.errors import SteeringError
-from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.simulation.flow import simulate
-from lie_codegen.simulation.metric import matrix_log
-from lie_codegen.steering.plan import Controls
-from lie_codegen.steering.seeds import loop_areas
+from lie_codegen.algebra.lie_algebra import LieAlgebra
 
 Array = NDArray[Any]
 
-_NEGLIGIBLE = 1e-9
-_ITERATIONS = 40
+_TINY = 1e-9
+
+
+class Segment(Protocol):
+    """A family of controls u(s), s in [0, 1], m of them, with as many parameters as `count`."""
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+
+    @property
+    def harmonics(self) -> int:
+        """Of the controls; for the number of integration steps."""
+
+    def velocity(self, x: Array, s: Array) -> Array:
+        """(k, m) u."""
+
+    def slopes(self, x: Array, s: Array) -> Array | None:
+        """(k, m, count) du/dx; None where it is singular and the endpoint's derivative is `limit`."""
+
+    def limit(self, algebra: LieAlgebra, controls: tuple[int, ...]) -> Array:
+        """(n, count) derivative of log X(1) at x = 0."""
+
+    def energy(self, x: Array) -> float:
+        """int_0^1 |u|^2."""
 
 
 @dataclass(frozen=True)
-class Chain:
-    """The straight part x and the signed areas, one a pair of controls; unit time in equal parts.
+class Straight:
+    """Constant controls x (m,): exp(sum x_i A_i)."""
+
+    count: int
+
+    harmonics: int = 1
+
+    def velocity(self, x: Array, s: Array) -> Array:
+        return np.tile(x, (len(s), 1))
+
+    def slopes(self, x: Array, s: Array) -> Array | None:
+        return np.broadcast_to(np.eye(self.count), (len(s), self.count, self.count))
+
+    def limit(self, algebra: LieAlgebra, controls: tuple[int, ...]) -> Array:
+        return np.eye(algebra.dim)[:, list(controls)]
+
+    def energy(self, x: Array) -> float:
+        return float(x @ x)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A circle in the plane of two controls, from the origin and back; x is its signed area.
 
     Attributes:
-        group, controls: the system; controls are positions.
-        straight: (m,) displacement of the straight part.
-        pairs: of positions among the controls.
-        areas: (pairs,).
+        controls: m.
+        pair: the two, as positions among the controls.
     """
 
-    group: MatrixGroup
-    controls: tuple[int, ...]
-    straight: Array
-    pairs: tuple[tuple[int, int], ...]
-    areas: Array
+    controls: int
+    pair: tuple[int, int]
 
-    @staticmethod
-    def towards(group: MatrixGroup, controls: tuple[int, ...], x: Array) -> Chain:
-        """The chain that reaches the coordinates x to second order; only pairs that are needed."""
-        pairs, areas = loop_areas(group, controls, x)
-        useful = [k for k, pair in enumerate(pairs) if _closes(group, controls, pair)]
-        return Chain(group, controls, x[list(controls)], tuple(pairs[k] for k in useful), areas[useful])
+    count: int = 1
+    harmonics: int = 1
 
-    def loops(self) -> Iterator[tuple[tuple[int, int], float]]:
-        """((position, position), area) of each loop."""
-        for (a, b), area in zip(self.pairs, self.areas, strict=True):
-            yield (self.controls[a], self.controls[b]), float(area)
+    def velocity(self, x: Array, s: Array) -> Array:
+        return float(np.sqrt(abs(x[0]))) * self._shape(float(np.sign(x[0])), s)
 
-    def controls_over(self, duration: float) -> Controls:
-        """u(t): the straight part, then the circles r (cos, sin), each starting and ending at the origin of its plane."""
-        parts = 1 + len(self.pairs)
-        span = duration / parts
+    def slopes(self, x: Array, s: Array) -> Array | None:
+        if abs(x[0]) < _TINY:
+            return None
+        return np.asarray(self.velocity(x, s)[:, :, None] / (2 * x[0]))
 
-        def evaluate(t: Array) -> Array:
-            u = np.zeros((len(t), self.group.dim))
-            part = np.minimum((t / span).astype(int), parts - 1)
-            straight = part == 0
-            u[np.ix_(straight, list(self.controls))] = self.straight / span
-            for number, ((a, b), area) in enumerate(zip(self.pairs, self.areas, strict=True), start=1):
-                now = part == number
-                angle = 2 * np.pi * (t[now] / span - number)
-                speed = 2 * np.pi / span * np.sqrt(abs(area) / np.pi)
-                u[now, self.controls[a]] = -speed * np.sin(angle)
-                u[now, self.controls[b]] = np.sign(area) * speed * np.cos(angle)
-            return u
+    def limit(self, algebra: LieAlgebra, controls: tuple[int, ...]) -> Array:
+        a, b = self.pair
+        return np.asarray(algebra.structure_constants[controls[a], controls[b]])[:, None]
 
-        return Controls(evaluate, span * np.arange(1, parts))
+    def energy(self, x: Array) -> float:
+        return float(4 * np.pi * abs(x[0]))
 
-    def end(self) -> Array:
-        """(d, d) where the true system ends."""
-        return np.asarray(simulate(self.group, self.controls_over(1.0), t=[0.0, 1.0], tolerance=1e-12).X[-1])
-
-    def retuned(self, target: Array) -> Chain:
-        """The chain, straight part and areas changed, that ends at the target exactly.
-
-        Raises:
-            SteeringError: if Gauss-Newton, damped, does not converge.
-        """
-        chain, gap = self, self._gap(target)
-        damping = 1e-3
-        for _ in range(_ITERATIONS):
-            if np.max(np.abs(gap)) < 1e-12:
-                return chain
-            J = chain._slopes(target)
-            step = np.linalg.solve(J.T @ J + damping**2 * np.eye(J.shape[1]), -J.T @ gap)
-            trial = chain._moved(step)
-            trial_gap = trial._gap(target)
-            if np.linalg.norm(trial_gap) < np.linalg.norm(gap):
-                chain, gap, damping = trial, trial_gap, damping * 0.1
-            else:
-                damping = max(damping * 5, 1e-8)
-        if np.max(np.abs(gap)) < 1e-9:
-            return chain
-        raise SteeringError(
-            f"steer({self.group.name}): the chain of loops cannot be retuned to the target (misses by {np.linalg.norm(gap):.2g}); "
-            "use method='optimal', or exact=False with method='feedback'"
-        )
-
-    def _moved(self, step: Array) -> Chain:
-        m = len(self.controls)
-        return replace(self, straight=self.straight + step[:m], areas=self.areas + step[m:])
-
-    def _gap(self, target: Array) -> Array:
-        relative = np.linalg.solve(target, self.end())
-        gap, off = matrix_log(self.group, relative)
-        return gap if off <= 1e-6 else self.group.project(relative - np.eye(self.group.degree))
-
-    def _slopes(self, target: Array) -> Array:
-        """Central differences; the derivative by an area near zero is taken away from it, where it is smooth."""
-        size = len(self.straight) + len(self.areas)
-        h = 1e-5
-        columns = []
-        for k in range(size):
-            e = np.zeros(size)
-            e[k] = h
-            columns.append((self._moved(e)._gap(target) - self._moved(-e)._gap(target)) / (2 * h))
-        return np.array(columns).T
+    def _shape(self, sign: float, s: Array) -> Array:
+        u = np.zeros((len(s), self.controls))
+        speed = 2 * np.sqrt(np.pi)
+        u[:, self.pair[0]] = -speed * np.sin(2 * np.pi * s)
+        u[:, self.pair[1]] = sign * speed * np.cos(2 * np.pi * s)
+        return u
 
 
-def _closes(group: MatrixGroup, controls: tuple[int, ...], pair: tuple[int, int]) -> bool:
-    row = group.algebra.structure_constants[controls[pair[0]], controls[pair[1]]]
-    free = [k for k in range(group.dim) if k not in controls]
-    return bool(np.any(np.abs(row[free]) > _NEGLIGIBLE))
+@dataclass(frozen=True)
+class FigureEight:
+    """In-phase harmonics 1 : 2 along the directions a and b of the control space; x is the signed moment M.
+
+    Attributes:
+        a, b: (m,) unit vectors.
+    """
+
+    a: tuple[float, ...]
+    b: tuple[float, ...]
+
+    count: int = 1
+    harmonics: int = 2
+
+    def velocity(self, x: Array, s: Array) -> Array:
+        beta = -np.sign(x[0]) * np.cbrt(abs(x[0]) / (4 * np.pi))
+        alpha = np.sqrt(8.0) * abs(beta)
+        first = 2 * np.pi * alpha * np.cos(2 * np.pi * s)
+        second = 4 * np.pi * beta * np.cos(4 * np.pi * s)
+        return np.outer(first, self.a) + np.outer(second, self.b)
+
+    def slopes(self, x: Array, s: Array) -> Array | None:
+        if abs(x[0]) < _TINY:
+            return None
+        return np.asarray(self.velocity(x, s)[:, :, None] / (3 * x[0]))
+
+    def limit(self, algebra: LieAlgebra, controls: tuple[int, ...]) -> Array:
+        return double_bracket(algebra, controls, np.array(self.a), np.array(self.b))[:, None]
+
+    def energy(self, x: Array) -> float:
+        return float(24 * np.pi**2 * np.cbrt(abs(x[0]) / (4 * np.pi)) ** 2)
+
+
+def double_bracket(algebra: LieAlgebra, controls: tuple[int, ...], a: Array, b: Array) -> Array:
+    """(n,) [a, [a, b]] for a and b in the span of the controls."""
+    c = algebra.structure_constants
+    place = list(controls)
+    inner = np.einsum("i,j,ijk->k", a, b, c[np.ix_(place, place)])
+    return np.asarray(np.einsum("i,j,ijk->k", a, inner, c[place]))
