@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
@@ -21,7 +22,7 @@ import toy_kernels
 
 from lie_codegen.errors import CacheError, CacheWarning, CodegenError, CompileError, NoCompilerWarning
 from lie_codegen.kernels.kernel import Kernel, Port
-from lie_codegen.runtime import build, cache, cache_folder, compiler, ladder
+from lie_codegen.runtime import build, cache, cache_folder, compiler, ladder, opened
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
@@ -252,7 +253,7 @@ def test_a_library_that_goes_between_check_and_load_is_built_again(
         return entry
 
     monkeypatch.setattr(cache, "find_request", evicted)
-    monkeypatch.setattr(build, "load_library", load_copy)
+    monkeypatch.setattr(opened, "load_library", load_copy)
     assert build_kernels(lambda: [scaled(5)], definition="five").scale(2.0) == 10.0
     assert len(compiles) == 2
 
@@ -395,7 +396,7 @@ def test_a_working_compiler_that_refuses_the_text_is_an_error(monkeypatch: pytes
     def broken(*args: Any) -> Any:
         sources = real(*args)
         files = {name: text.replace("const double", "const dubble") for name, text in sources.files.items()}
-        return package.LibrarySources(files, sources.main, sources.statements, sources.signatures)
+        return dataclasses.replace(sources, files=files)
 
     monkeypatch.setattr(package, "render_library", broken)
     with pytest.raises(CompileError, match="dubble"):

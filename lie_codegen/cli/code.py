@@ -36,7 +36,7 @@ def build(group: GroupName, json: Json = False) -> None:
     from lie_codegen.runtime.front import build as build_library
 
     started = time.perf_counter()
-    library = build_library(group)
+    library = build_library(group, kernels="all")
     seconds = time.perf_counter() - started
     how = f"compiled: {library.path}" if library.compiled else "interpreted: no C compiler"
     text = f"{library.namespace} in {seconds:.2f} s, {how}\n  " + ", ".join(library.kernels)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.codegen.lanes import lane_body, lanes_header
+from lie_codegen.codegen.library_sources import LibrarySources
 from lie_codegen.codegen.opcodes import REALS, Target
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.tape import tape_of
@@ -22,25 +23,6 @@ from lie_codegen.kernels.kernel import Kernel
 
 #: What example.c allows between its results and the vectors, relative to max(1, |expected|).
 TOLERANCES = {"double": 1e-11, "float": 1e-5}
-
-
-@dataclass(frozen=True)
-class LibrarySources:
-    """What the runtime compiles: one unit that includes the package's own source.
-
-    Attributes:
-        files: flat file name -> text.
-        main: the file to hand to the compiler.
-        statements: number of statements, by which the runtime chooses the optimisation level.
-        signatures: one a kernel.
-        notes: what the build log says about them.
-    """
-
-    files: Mapping[str, str]
-    main: str
-    statements: int
-    signatures: tuple[Signature, ...]
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -115,6 +97,7 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
         ),
     }
     return LibrarySources(
+        namespace=namespace,
         files=files,
         main=f"{namespace}_binding.c",
         statements=sum(len(tape.statements) for tape in tapes),

@@ -21,9 +21,18 @@ def group(name_or_path: str | Path) -> MatrixGroup:
     """
     if not isinstance(name_or_path, str | Path):
         raise UnknownGroupError(f"expected the name of a group or the path of a group file, got {name_or_path!r}")
+    return group_of_source(name_or_path, definition_source(name_or_path))
+
+
+def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:
+    """The group whose `definition_source` was read before, whatever the file holds now.
+
+    Raises:
+        GroupFileError, InputError: as `group`.
+    """
     if is_generated(name_or_path):
         return _generated(str(name_or_path))
-    return _parsed(definition_source(name_or_path), str(group_path(name_or_path)))
+    return _parsed(source, str(group_path(name_or_path)))
 
 
 @lru_cache(maxsize=64)

@@ -7,28 +7,24 @@ C text -> compiler -> shared library -> entry      (cold)
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import CacheError, CodegenError
-from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.runtime import cache
-from lie_codegen.runtime.backend import CtypesBackend, InterpretedBackend, load_library
 from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
 from lie_codegen.runtime.cache_upkeep import evict
-from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, warn_no_compiler
 from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
-from lie_codegen.runtime.extension import extension
+from lie_codegen.runtime.extension import prepare_extension
 from lie_codegen.runtime.ladder import compile_entry, first_that_works
-from lie_codegen.runtime.lane_library import ONE_LANE, LaneLibrary, keep_sources
+from lie_codegen.runtime.lane_library import ONE_LANE, keep_sources
 from lie_codegen.runtime.library import Library, check_names
-from lie_codegen.runtime.quick import quick
 
 if TYPE_CHECKING:
-    from lie_codegen.codegen.package import LibrarySources
+    from lie_codegen.codegen.library_sources import LibrarySources
+    from lie_codegen.kernels.kernel import Kernel
 
 
 def build_kernels(
@@ -56,7 +52,31 @@ def build_kernels(
     if not compilers:
         warn_no_compiler()
         return interpreted(make_kernels(), namespace=namespace)
+
+    def make_sources() -> LibrarySources:
+        from lie_codegen.codegen import package
+
+        kernels = tuple(make_kernels())
+        return package.render_library(_namespace(namespace, kernels), kernels)
+
+    return build_sources(make_sources, compilers, namespace=namespace, definition=definition, options=options)
+
+
+def build_sources(
+    make_sources: Callable[[], LibrarySources],
+    compilers: Sequence[Compiler],
+    *,
+    namespace: str | None = None,
+    definition: str | None = None,
+    options: Mapping[str, Any] | None = None,
+) -> Library:
+    """As `build_kernels`, from what makes the C text; some compiler is there.
+
+    Raises:
+        CompileError, CacheError: as `build_kernels`.
+    """
     folder = usable_folder()
+    prepare_extension()
     requests = []
     if definition is not None:
         requests = [_request(namespace, definition, options or {}, compiler) for compiler in compilers]
@@ -64,20 +84,21 @@ def build_kernels(
             entry = cache.find_request(folder, request)
             if entry is not None and (library := _open_or_none(entry)) is not None:
                 return library
-    beside = threading.Thread(target=extension, daemon=True)  # compiled, if need be, while the kernels are derived
-    beside.start()
-    kernels = tuple(make_kernels())
+    sources = make_sources()
+    check_names(sources.signatures)
     try:
-        return _compile(folder, namespace, kernels, compilers, requests, beside)
+        return _compile(folder, sources, compilers, requests)
     except OSError as error:
         reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
-        return _compile(temporary_folder(reason), namespace, kernels, compilers, requests, beside)
+        return _compile(temporary_folder(reason), sources, compilers, requests)
 
 
 def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:
     """The kernels run by CasADi's interpreter: no compiler, the same results."""
     from lie_codegen.codegen.package import render_library
     from lie_codegen.lowering.casadi_arithmetic import function_of
+    from lie_codegen.runtime.backend import InterpretedBackend
+    from lie_codegen.runtime.call import Compiled
 
     namespace = _namespace(namespace, kernels)
     signatures = render_library(namespace, kernels).signatures  # refuses what C would refuse
@@ -111,19 +132,7 @@ def _request(namespace: str | None, definition: str, options: Mapping[str, Any],
     )
 
 
-def _compile(
-    folder: Path,
-    namespace: str | None,
-    kernels: Sequence[Kernel],
-    compilers: Sequence[Compiler],
-    requests: Sequence[str],
-    beside: threading.Thread,
-) -> Library:
-    from lie_codegen.codegen.package import render_library
-
-    namespace = _namespace(namespace, kernels)
-    sources = render_library(namespace, kernels)
-    check_names(sources.signatures)
+def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler], requests: Sequence[str]) -> Library:
     flags = flags_for(sources.statements)
 
     def attempt(number: int, compiler: Compiler) -> cache.Entry:
@@ -133,30 +142,33 @@ def _compile(
                 "signatures": [signature.to_json() for signature in sources.signatures],
                 "flags": flags,
                 "compiler": compiler.identity,
-                "versions": versions(),
-                "templates": templates_digest(),
                 "cpu": cpu_identity(),
             }
         )
         with cache.lock(folder, key):
-            entry = cache.find_entry(folder, key) or _fill(folder, key, namespace, sources, compiler, flags)
+            entry = cache.find_entry(folder, key) or _fill(folder, key, sources, compiler, flags)
             if requests:
                 cache.store_request(folder, requests[number], key)
         return entry
 
     entry = first_that_works(folder, compilers, attempt)
-    beside.join()
     library = _open(entry)
     evict(folder, keep=entry.library.parent.name)
     return library
 
 
-def _fill(
-    folder: Path, key: str, namespace: str, sources: LibrarySources, compiler: Compiler, flags: tuple[str, ...]
-) -> cache.Entry:
+def _fill(folder: Path, key: str, sources: LibrarySources, compiler: Compiler, flags: tuple[str, ...]) -> cache.Entry:
     one_lane = (*flags, ONE_LANE)
     entry = compile_entry(
-        folder, key, sources.files, sources.main, namespace, compiler, one_lane, sources.signatures, sources.notes
+        folder,
+        key,
+        sources.files,
+        sources.main,
+        sources.namespace,
+        compiler,
+        one_lane,
+        sources.signatures,
+        sources.notes,
     )
     keep_sources(entry, sources.files, sources.main, flags, compiler)
     return entry
@@ -171,11 +183,6 @@ def _open_or_none(entry: cache.Entry) -> Library | None:
 
 
 def _open(entry: cache.Entry) -> Library:
-    shared = load_library(entry.library)
-    lanes = LaneLibrary(entry, shared)
-    functions = [
-        quick(Compiled(signature, CtypesBackend(shared, signature, lanes), compiled=True), shared, lanes, signature)
-        for signature in entry.signatures
-    ]
-    how = "the extension type" if functions and not isinstance(functions[0], Compiled) else "ctypes"
-    return Library(entry.namespace, functions, entry.library, (f"calls: through {how}", *entry.notes), lanes.lanes)
+    from lie_codegen.runtime.opened import open_entry  # numpy, which a cold build imports while compilers run
+
+    return open_entry(entry)

@@ -100,6 +100,20 @@ def store_request(folder: Path, request: str, key: str) -> None:
     write_json(folder / "requests" / f"{request}.json", {"entry": key})
 
 
+def find_note(folder: Path, key: str) -> Any:
+    """What was noted under that digest; None if nothing was."""
+    return _read_json(folder / "requests" / f"{key}.json")
+
+
+def store_note(folder: Path, key: str, data: Any) -> None:
+    """Note plain data under a digest.
+
+    Raises:
+        OSError: as `store_entry`.
+    """
+    write_json(folder / "requests" / f"{key}.json", data)
+
+
 @contextlib.contextmanager
 def lock(folder: Path, key: str) -> Iterator[None]:
     """Hold the entry against other processes; a process that dies lets go of it.

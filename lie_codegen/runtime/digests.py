@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import platform
 import re
 import sys
 from functools import cache
@@ -67,14 +66,20 @@ def cpu_identity() -> str:
                     lines.append(line.strip())
     except OSError:
         lines = []
-    return "\n".join([platform.system(), platform.machine(), *lines])
+    machine = os.uname().machine if hasattr(os, "uname") else os.environ.get("PROCESSOR_ARCHITECTURE", "")
+    return "\n".join([sys.platform, machine, *lines])
 
 
 def _tree_digest(folder: Path, suffix: str) -> str:
-    files = sorted(path for path in folder.rglob(f"*{suffix}") if path.is_file())
+    """Of the names and contents below a folder; by os and not pathlib, which would take three times as long."""
+    root = str(folder)
+    paths = sorted(
+        os.path.join(parent, name) for parent, _, names in os.walk(root) for name in names if name.endswith(suffix)
+    )
     summary = hashlib.sha256()
-    for path in files:
-        content = path.read_bytes()
-        summary.update(f"{path.relative_to(folder).as_posix()}\0{len(content)}\0".encode())
+    for path in paths:
+        with open(path, "rb", buffering=0) as file:
+            content = file.read()
+        summary.update(f"{path[len(root) :]}\0{len(content)}\0".encode())
         summary.update(content)
     return summary.hexdigest()

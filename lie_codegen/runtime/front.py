@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from lie_codegen.errors import InputError
 from lie_codegen.runtime.build import build_kernels
+from lie_codegen.runtime.group_library import GroupLibrary, group_library
 from lie_codegen.runtime.library import Library
 
 if TYPE_CHECKING:
@@ -17,24 +18,33 @@ if TYPE_CHECKING:
     Buildable = MatrixGroup | Kernel | Sequence[Kernel] | str | Path
 
 
-def build(what: Buildable) -> Library:
+def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = ()) -> Library:
     """Compiled kernels, from the cache where they are there.
+
+    The kernels of a group are derived and compiled one by one, each when it is first asked for; a list of Kernels is
+    compiled at once.
 
     Args:
         what: a group (all its kernels), a catalogue name or the path of a group file (the same, without importing SymPy
-            when the cache has it), a Kernel, or several Kernels of one namespace.
+            when the cache has it, or the package brings the C sources), a Kernel, or several Kernels of one namespace.
+        kernels: of a group: names to have compiled before this returns, side by side on the processor's cores; "all"
+            for every one.
 
     Raises:
-        InputError: if it is none of these, or kernels of several namespaces or with repeated names are given.
-        CompileError: with the command and the compiler's own words.
+        InputError: if it is none of these, kernels of several namespaces or with repeated names are given, or `kernels`
+            names one that there is not.
+        CompileError: with the command and the compiler's own words; for a group when the kernel is asked for.
     """
     if isinstance(what, str | Path):
-        return _build_named(what)
-    group, kernels = _group_or_kernels(what)
-    if group is None:
-        namespace = _namespace(kernels)
-        return build_kernels(lambda: kernels, namespace=namespace, definition=None)
-    return build_kernels(lambda: _kernels_of(group), namespace=group.name, definition=f"group\n{group.definition}")
+        library = _build_named(what)
+    else:
+        group, given = _group_or_kernels(what)
+        if group is None:
+            namespace = _namespace(given)
+            return build_kernels(lambda: given, namespace=namespace, definition=None)
+        library = group_library(object_definition(group), lambda: group)
+    library.compile(library.kernels if kernels == "all" else kernels)
+    return library
 
 
 def generate(
@@ -88,17 +98,27 @@ def _about(group: MatrixGroup) -> str:
     return "\n".join([line for line in (group.description,) if line] + ["Basis, row by row:", *rows])
 
 
-def _build_named(what: str | Path) -> Library:
+def source_definition(source: bytes) -> str:
+    """What `build` knows a name or a group file by."""
+    return f"file\n{source.decode('utf-8', errors='replace')}"
+
+
+def object_definition(group: MatrixGroup) -> str:
+    """What `build` knows a group by."""
+    return f"group\n{group.definition}"
+
+
+def _build_named(what: str | Path) -> GroupLibrary:
     from lie_codegen.groups.catalogue_names import definition_source
 
-    source = definition_source(what).decode("utf-8", errors="replace")
+    source = definition_source(what)
 
-    def kernels() -> Sequence[Kernel]:
-        from lie_codegen.groups.catalogue_load import group
+    def load() -> MatrixGroup:
+        from lie_codegen.groups.catalogue_load import group_of_source
 
-        return _kernels_of(group(what))
+        return group_of_source(what, source)
 
-    return build_kernels(kernels, definition=f"file\n{source}")
+    return group_library(source_definition(source), load)
 
 
 def _kernels_of(group: MatrixGroup) -> tuple[Kernel, ...]:

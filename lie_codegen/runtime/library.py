@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CodegenError
-from lie_codegen.runtime.call import Compiled
+
+if TYPE_CHECKING:
+    from lie_codegen.runtime.call import Compiled
 
 
 class Library:
@@ -17,7 +20,7 @@ class Library:
         namespace: prefix of the C symbols.
         kernels: names, in order.
         compiled: False where CasADi's interpreter stands in for C.
-        path: the shared library, or None.
+        path: the shared library, the folder of all of them for a group, or None.
         build_log: lanes of a batch, operations without a lane form, how calls go.
     """
 
@@ -40,8 +43,7 @@ class Library:
         self.path = path
         self._notes = tuple(build_log)
         self._lanes = lanes
-        self._functions = {function.name: function for function in functions}
-        self.__dict__.update(self._functions)
+        self.__dict__.update({function.name: function for function in functions})
 
     @property
     def build_log(self) -> tuple[str, ...]:
@@ -51,15 +53,21 @@ class Library:
         return (f"batches: {self._lanes()} samples at a time", *self._notes)
 
     def __getattr__(self, name: str) -> Compiled:
-        functions = self.__dict__.get("_functions", {})
+        kernels = self.__dict__.get("kernels", ())
         import difflib
 
-        close = difflib.get_close_matches(name, functions, n=3) if not name.startswith("_") else []
-        hint = f"; near: {', '.join(close)}" if close else f"; it has {', '.join(functions)}"
+        close = difflib.get_close_matches(name, kernels, n=3) if not name.startswith("_") else []
+        hint = f"; near: {', '.join(close)}" if close else f"; it has {', '.join(kernels)}"
         raise AttributeError(f"the library {self.__dict__.get('namespace')} has no kernel {name!r}{hint}")
 
     def __getitem__(self, name: str) -> Compiled:
-        return self._functions[name]
+        if name not in self.kernels:
+            raise KeyError(name)
+        function: Compiled = getattr(self, name)
+        return function
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.kernels})
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.kernels)

@@ -1,0 +1,97 @@
+"""C sources of the catalogue's kernels that ship with the package: neither SymPy nor CasADi is needed to build them.
+
+    prebuilt/index.json        digest of a definition -> name; the files that determine the C text, and their digest
+    prebuilt/<name>.json.xz    the sources of each kernel of the group
+    prebuilt/lanes.json.xz     the file they all include
+
+What does not match, to the byte, the definition asked for and the source of this package is not used. Written by
+tests/tools/prebuild.py.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lie_codegen.runtime.digests import digest
+
+if TYPE_CHECKING:
+    from lie_codegen.codegen.library_sources import LibrarySources
+
+#: The file that every kernel includes, and the name it is stored by.
+SHARED, SHARED_STORE = "lie_codegen_lanes.h", "lanes"
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+@dataclass(frozen=True)
+class Prebuilt:
+    """The kernels of one group.
+
+    Attributes:
+        namespace: prefix of the C symbols.
+        kernels: names, in order.
+    """
+
+    namespace: str
+    kernels: tuple[str, ...]
+    _data: Mapping[str, Any]
+    _shared: Mapping[str, str]
+
+    def sources(self, name: str) -> LibrarySources:
+        """The C text of one kernel."""
+        from lie_codegen.codegen.library_sources import LibrarySources
+
+        own = LibrarySources.from_json(self._data[name])
+        return replace(own, files={**own.files, **self._shared})
+
+
+def find_prebuilt(definition: str, folder: Path | None = None) -> Prebuilt | None:
+    """The sources of that definition; None where there are none, or none that are current and whole."""
+    home = prebuilt_folder() if folder is None else folder
+    try:
+        index = json.loads((home / "index.json").read_bytes())
+        name = index["definitions"].get(digest(definition))
+        if name is None or source_digest(index["files"]) != index["sha256"]:
+            return None
+        data, shared = (_unpacked(home, each, index["stores"][each]) for each in (name, SHARED_STORE))
+        return Prebuilt(str(data["namespace"]), tuple(data["kernels"]), data["kernels"], shared)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError):
+        return None
+
+
+def prebuilt_folder() -> Path:
+    """Where they are in the installed package."""
+    return _PACKAGE / "prebuilt"
+
+
+def source_digest(files: Iterable[str]) -> str:
+    """Digest of files of the package, given by their paths in it; templates by theirs after "templates/".
+
+    Raises:
+        OSError: one is not there.
+    """
+    from lie_codegen.codegen.templates import template_folder
+
+    summary = hashlib.sha256()
+    for name in files:
+        path = template_folder() / name.removeprefix("templates/") if name.startswith("templates/") else _PACKAGE / name
+        content = path.read_bytes()
+        summary.update(f"{name}\0{len(content)}\0".encode())
+        summary.update(content)
+    return summary.hexdigest()
+
+
+def _unpacked(home: Path, name: str, expected: str) -> Any:
+    import lzma
+
+    packed = (home / f"{name}.json.xz").read_bytes()
+    if hashlib.sha256(packed).hexdigest() != expected:
+        raise ValueError(f"prebuilt/{name}.json.xz is not what the index says")
+    try:
+        return json.loads(lzma.decompress(packed))
+    except lzma.LZMAError as error:
+        raise ValueError(str(error)) from error
