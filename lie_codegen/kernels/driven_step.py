@@ -20,6 +20,38 @@ from lie_codegen.kernels.tracking_kernels import force_units
 from lie_codegen.kernels.wei_norman_body import WeiNormanData
 
 
+def driven_increments(
+    group: MatrixGroup,
+    ops: Arithmetic,
+    xi: Vector,
+    J: Matrix,
+    inverse: Matrix,
+    f0: Vector,
+    fm: Vector,
+    f1: Vector,
+    h: Scalar,
+) -> tuple[Vector, Vector]:
+    """Theta and the change of xi with X_next = X exp(Theta): one RKMK4 step of Theta' = dexpinv(xi), J xi' = ad*_xi J xi + f."""
+
+    def rates(theta: Vector, change: Vector, force: Vector) -> tuple[Vector, Vector]:
+        eta = plus(xi, change)
+        once = bracket(ops, group.algebra, theta, eta)
+        twice = bracket(ops, group.algebra, theta, once)
+        turning = ad_star(ops, group.algebra, eta, matvec(J, eta))
+        return plus(eta, scaled(0.5, once), scaled(1 / 12, twice)), matvec(inverse, plus(turning, force))
+
+    zero: Vector = [0] * group.dim
+    stages = [rates(zero, zero, f0)]
+    for part, force in ((0.5, fm), (0.5, fm), (1, f1)):
+        k, a = stages[-1]
+        stages.append(rates(scaled(part * h, k), scaled(part * h, a), force))
+    (k1, a1), (k2, a2), (k3, a3), (k4, a4) = stages
+    sixth, third = h / 6, h / 3
+    theta = plus(scaled(sixth, plus(k1, k4)), scaled(third, plus(k2, k3)))
+    change = plus(scaled(sixth, plus(a1, a4)), scaled(third, plus(a2, a3)))
+    return theta, change
+
+
 def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE) -> Kernel:
     """(state, inertia, inverse, f0, fm, f1, h) -> (state_next,): fourth order, on the group for |h xi| <= 1/4.
 
@@ -36,23 +68,7 @@ def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE) -> Kernel:
         ops: Arithmetic, state: Vector, J: Matrix, inverse: Matrix, f0: Vector, fm: Vector, f1: Vector, h: Scalar
     ) -> tuple[Any, ...]:
         X, xi = unpack(group, state[:size]), list(state[size:])
-
-        def rates(theta: Vector, change: Vector, force: Vector) -> tuple[Vector, Vector]:
-            eta = plus(xi, change)
-            once = bracket(ops, group.algebra, theta, eta)
-            twice = bracket(ops, group.algebra, theta, once)
-            turning = ad_star(ops, group.algebra, eta, matvec(J, eta))
-            return plus(eta, scaled(0.5, once), scaled(1 / 12, twice)), matvec(inverse, plus(turning, force))
-
-        zero: Vector = [0] * n
-        stages = [rates(zero, zero, f0)]
-        for part, force in ((0.5, fm), (0.5, fm), (1, f1)):
-            k, a = stages[-1]
-            stages.append(rates(scaled(part * h, k), scaled(part * h, a), force))
-        (k1, a1), (k2, a2), (k3, a3), (k4, a4) = stages
-        sixth, third = h / 6, h / 3
-        theta = plus(scaled(sixth, plus(k1, k4)), scaled(third, plus(k2, k3)))
-        change = plus(scaled(sixth, plus(a1, a4)), scaled(third, plus(a2, a3)))
+        theta, change = driven_increments(group, ops, xi, J, inverse, f0, fm, f1, h)
         return ([*pack(group, times_taylor_exp(group, ops, X, theta, degree)), *plus(xi, change)],)
 
     data = WeiNormanData(group)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.complex_scalar import Complex
 
 
+@lru_cache(maxsize=128)
 def varying_entries(group: MatrixGroup) -> tuple[tuple[int, int], ...]:
     """Positions (i, j), row by row, of the entries of X that can differ from those of the identity.
 

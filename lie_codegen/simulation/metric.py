@@ -16,12 +16,19 @@ from lie_codegen.simulation.libraries import integrators
 Array = NDArray[Any]
 
 _ON_GROUP = 1e-8
+#: Nearer to the identity than this the series of the logarithm to third order is exact to rounding.
+_NEAR = 1e-5
 _SEED = 20
 
 
 def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
     """Coordinates x of the principal logarithm of X, and max |exp(hat(x)) - X|: zero where X = exp(hat(x))."""
     matrix = np.asarray(X)
+    small = matrix - np.eye(group.degree)
+    if float(np.max(np.abs(small))) <= _NEAR / group.degree:
+        logarithm = small @ (np.eye(group.degree) - small @ (np.eye(group.degree) / 2 - small / 3))
+        x = group.project(logarithm)
+        return x, float(np.max(np.abs(group.hat(x) - logarithm)))
     logarithm = np.asarray(scipy.linalg.logm(matrix))
     if not np.all(np.isfinite(logarithm)):
         return np.zeros(group.dim), float("inf")

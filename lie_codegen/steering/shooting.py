@@ -72,12 +72,12 @@ class Shooter:
         names = Extremals.__dataclass_fields__
         return Extremals(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
-    def extremal(self, mu0: ArrayLike, *, weights: ArrayLike | None = None) -> Extremal:
-        """The extremal of a costate, to be evaluated at any time."""
+    def extremal(self, mu0: ArrayLike, *, weights: ArrayLike | None = None, nodes: int | None = None) -> Extremal:
+        """The extremal of a costate, to be evaluated at any time; `nodes` intervals, as many as it needs if not given."""
         w = self.check_weights(weights)
         costate = np.array(mu0, dtype=float)
-        size = float(np.linalg.norm(costate))
-        nodes = int(np.clip(4 * size, _NODES, 4096))
+        if nodes is None:
+            nodes = int(np.clip(4 * float(np.linalg.norm(costate)), _NODES, 4096))
         return Extremal(self.group, self.controls, w, costate, self._machine.sample(costate, w, nodes + 1))
 
     def check_weights(self, weights: ArrayLike | None) -> Array:

@@ -1,7 +1,7 @@
 """method="transcription": whatever has bounds, obstacles, drift, torques, via points or a free time; multiple shooting.
 
 The program is built once for its structure (`transcription_problem`) and solved for any numbers, from several first guesses:
-the unconstrained optimum by shooting, the area rule, a straight path. Solvers' own flags are not believed: the true
+the unconstrained optimum by shooting, a straight path, the area rule. Solvers' own flags are not believed: the true
 system is integrated under the controls found, and the clearance of every obstacle is taken on a fine grid; where it
 is violated between the nodes, the obstacle is enlarged by as much and the program solved again.
 """
@@ -10,34 +10,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.errors import SteeringError
+from lie_codegen.errors import ComputationError, SteeringError
+from lie_codegen.simulation.metric import distance
 from lie_codegen.steering.constraints import Obstacle
-from lie_codegen.steering.finish import finish
-from lie_codegen.steering.guesses import guesses, rollout
 from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription_pose import Numbers, pose
-from lie_codegen.steering.transcription_problem import Structure, program
-from lie_codegen.steering.transcription_solve import (
-    Candidate,
-    candidate_controls,
-    fine_states,
-    first_variables,
-    ratios,
-    refined,
-    smooth_torques,
-)
+from lie_codegen.steering.transcription_complaint import complaint
+from lie_codegen.steering.transcription_flow import piecewise_linear
+from lie_codegen.steering.transcription_guess import first_variables, guesses
+from lie_codegen.steering.transcription_numbers import Numbers, Options
+from lie_codegen.steering.transcription_pose import pose
+from lie_codegen.steering.transcription_problem import program
+from lie_codegen.steering.transcription_solve import Candidate, Workbench, predicted_aim, refined
+from lie_codegen.steering.transcription_structure import Structure
 
 Array = NDArray[Any]
 
 _FALLBACK = 4
-_FEASIBLE = 1e-7
 
 
 def transcription(
@@ -60,7 +54,7 @@ def transcription(
     weights: ArrayLike | None = None,
     intervals: int = 64,
     starts: int = 3,
-    solver: str = "ipopt",
+    solver: str = "auto",
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Minimum energy, or minimum time, under constraints; controls are continuous and linear on each interval.
@@ -84,36 +78,16 @@ def transcription(
         weights: (m,) positive w_i, ones if not given.
         intervals: N, pieces of the controls.
         starts: first guesses tried; the cheapest admissible result wins.
-        solver: "ipopt" or "fatrop".
-        progress: called with one line a solve.
+        solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere, or the controls are periodic; or either.
+        progress: called with one line a solve, and within a long one by ipopt every second. What was done is in the plan's
+            details["solves"] in any case: start, solver, iterations, objective, violation, seconds and ipopt's residuals.
 
     Raises:
         SteeringInputError, ShapeError: about an option.
-        SteeringError: no admissible manoeuvre found; says which limit the unconstrained optimum breaks.
+        SteeringError: no admissible manoeuvre found; says which limit the first guess breaks, and by how much.
     """
-    started = time.perf_counter()
-    structure, numbers = pose(
-        task,
-        bounds=bounds,
-        rate_bounds=rate_bounds,
-        obstacles=obstacles,
-        via=via,
-        drift=drift,
-        rest=rest,
-        periodic=periodic,
-        objective=objective,
-        longest=longest,
-        dynamics=dynamics,
-        inertia=inertia,
-        velocity_bounds=velocity_bounds,
-        start_velocity=start_velocity,
-        end_velocity=end_velocity,
-        weights=weights,
-        intervals=intervals,
-        starts=starts,
-        solver=solver,
-    )
-    return _run(task, structure, numbers, starts, "transcription", (), progress or (lambda line: None), started)
+    given = {name: value for name, value in locals().items() if name not in ("task", "progress")}
+    return _run(task, Options(**given), "transcription", (), progress)
 
 
 def least_energy(
@@ -124,99 +98,100 @@ def least_energy(
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Minimum energy without constraints, where shooting failed."""
-    started = time.perf_counter()
-    structure, numbers = pose(task, weights=weights, starts=_FALLBACK)
-    return _run(task, structure, numbers, _FALLBACK, "optimal", tried, progress or (lambda line: None), started)
+    return _run(task, Options(weights=weights, starts=_FALLBACK), "optimal", tried, progress)
 
 
 def _run(
+    task: Task, asked: Options, method: str, tried: tuple[str, ...], progress: Callable[[str], None] | None
+) -> Plan:
+    started = time.perf_counter()
+    structure, numbers = pose(task, asked)
+    names = {"auto": ("ipopt",) if asked.periodic else ("fatrop", "ipopt")}.get(asked.solver, (asked.solver,))
+    candidates: list[Candidate] = []
+    building = 0.0
+    for name in names:
+        began = time.perf_counter()
+        built = program(structure, name, listening=progress is not None)
+        building += time.perf_counter() - began
+        bench = Workbench(task, structure, numbers, built, progress or (lambda line: None))
+        candidates += _candidates(bench, asked.starts)
+        if any(candidate.admissible for candidate in candidates):
+            break
+    good = [candidate for candidate in candidates if candidate.admissible]
+    if not good:
+        raise SteeringError(complaint(task, structure, numbers, candidates))
+    best = min(good, key=lambda candidate: candidate.objective)
+    seconds = {"build": building, "solve": time.perf_counter() - started - building}
+    return _plan(task, structure, numbers, method, tried, candidates, best, seconds)
+
+
+def _candidates(bench: Workbench, starts: int) -> list[Candidate]:
+    found = []
+    for name, v in guesses(bench.task, bench.structure, bench.numbers, starts):
+        try:
+            first = first_variables(bench.task, bench.structure, bench.numbers, v)
+            found.append(refined(bench, name, first, predicted_aim(bench, first)))
+        except ComputationError as error:
+            bench.say(f"from {name}: {error}")
+    return found
+
+
+def _plan(
     task: Task,
     structure: Structure,
     numbers: Numbers,
-    starts: int,
     method: str,
     tried: tuple[str, ...],
-    say: Callable[[str], None],
-    started: float,
+    candidates: Sequence[Candidate],
+    best: Candidate,
+    seconds: dict[str, float],
 ) -> Plan:
-    built_program = program(structure)
-    built = time.perf_counter()
-    candidates: list[tuple[Candidate, str]] = []
-    margins = np.zeros(len(numbers.obstacles))
-    for name, v in guesses(task, structure, numbers.via, starts):
-        candidate = refined(
-            task, structure, built_program, numbers, margins, first_variables(task, structure, numbers, v)
-        )
-        candidates.append((candidate, name))
-        say(
-            f"from {name}: {candidate.message}, objective {candidate.objective:.9g}, violation {candidate.violation:.1e}"
-        )
-    good = [pair for pair in candidates if pair[0].violation <= _FEASIBLE]
-    if not good:
-        raise SteeringError(_complaint(task, structure, numbers, [pair[0] for pair in candidates]))
-    best, name = min(good, key=lambda pair: pair[0].objective)
-    u, duration = candidate_controls(task, numbers, best)
-    done = replace(task, duration=duration)
-    drift = numbers.drift / task.duration
-    fine, states, xi = fine_states(task, numbers, best)
+    values = best.values / task.duration**numbers.power
+    duration = best.duration * task.duration
+    group, flight, last = task.group, best.flight, best.solves[-1]
+    a, b = values[:-1], values[1:]
     details: dict[str, Any] = {
-        "winner": f"transcription from {name}",
-        "tried": (*tried, *(f"transcription from {each}: {candidate.message}" for candidate, each in candidates)),
+        "winner": f"transcription from {last.start}",
+        "tried": (
+            *tried,
+            *(f"transcription from {each.solves[-1].start}: {each.solves[-1].message}" for each in candidates),
+        ),
         "intervals": structure.intervals,
-        "solver": structure.solver,
-        "iterations": sum(candidate.iterations for candidate, _ in candidates),
+        "solver": last.solver,
+        "iterations": sum(solve.iterations for each in candidates for solve in each.solves),
+        "solves": tuple(solve for each in candidates for solve in each.solves),
         "objective": "time" if structure.free_time else "energy",
         "discretisation": "controls continuous and linear on each interval: the cost is an upper bound of the optimum's",
-        "clearances": tuple(float(np.min(obstacle.clearance(states))) for obstacle in numbers.obstacles),
-        "control_peaks": tuple(float(x) for x in np.max(np.abs(best.values), axis=0) / task.duration**numbers.power),
-        "drift": drift,
+        "clearances": tuple(float(np.min(obstacle.clearance(flight.X))) for obstacle in numbers.obstacles),
+        "control_peaks": tuple(float(x) for x in np.max(np.abs(values), axis=0)),
+        "drift": numbers.drift / task.duration,
         "optimality": "a local minimum of the discretised problem, the best of the starts tried",
-        "fine_times": fine,
+        "fine_times": flight.t * task.duration,
     }
-    seconds = {"build": built - started, "solve": time.perf_counter() - built}
-    if numbers.dynamics is None:
-        return finish(
-            done, method, u, details, seconds, solved=Status.LOCAL, otherwise=Status.NOT_CONVERGED, drift=drift
-        )
-    second = numbers.dynamics
-    slip = float(np.linalg.norm(xi[-1] - second.ends[1] / task.duration))
-    details |= {
-        "dynamics": "second order: u is torque",
-        "inertia": second.inertia,
-        "start_velocity": second.ends[0] / task.duration,
-        "fine_velocities": xi,
-        "velocity_miss": slip,
-        "velocity_peaks": tuple(float(x) for x in np.max(np.abs(xi), axis=0)),
-    }
-    end = Status.LOCAL if slip * duration <= task.tolerance else Status.NOT_CONVERGED
-    return finish(done, method, u, details, seconds, solved=end, otherwise=Status.NOT_CONVERGED, end=states[-1])
-
-
-def _complaint(task: Task, structure: Structure, numbers: Numbers, candidates: list[Candidate]) -> str:
-    """What was tried, how near it came, and which limits the unconstrained optimum breaks."""
-    nearest = min(candidate.violation for candidate in candidates)
-    lines = [
-        f"steer({task.group.name}): no admissible manoeuvre from {len(candidates)} starts with {structure.intervals} "
-        f"intervals (smallest violation {nearest:.2g}; {candidates[0].message})"
-    ]
-    _, v = next(iter(guesses(task, structure, numbers.via, 1)))
-    if numbers.dynamics is None:
-        needs, what = v, "without limits the least-energy manoeuvre needs"
-        states = rollout(task.group, structure.controls, v, numbers.drift)
-    else:
-        states, _, needs = smooth_torques(task, structure, numbers, v)
-        what = "the first guess needs"
-    over = np.max(ratios(numbers, needs), axis=0)
-    for position, ratio in zip(structure.controls, over, strict=True):
-        if ratio > 1:
-            lines.append(f"{what} {ratio:.3g} times the bound of {task.group.labels[position]}")
-    largest = float(np.max(over))
-    if largest > 1 and not structure.free_time and not np.any(numbers.drift) and numbers.dynamics is None:
-        lines.append(f"{task.duration * largest:.4g} s would be enough for the bounds on the controls")
-    for number, obstacle in enumerate(numbers.obstacles, start=1):
-        if np.min(obstacle.clearance(states)) < 0:
-            lines.append(f"it crosses obstacle {number} ({type(obstacle).__name__})")
-        for which, element in (("start", np.eye(task.group.degree)), ("target", task.target)):
-            if obstacle.clearance(element[None])[0] < 0:
-                lines.append(f"the {which} itself is inside obstacle {number} ({type(obstacle).__name__})")
-    return "; ".join([*lines, "try a longer duration, more starts or more intervals"])
+    error, slip = distance(group, task.target, flight.X[-1]), 0.0
+    if numbers.dynamics is not None:
+        second, xi = numbers.dynamics, flight.xi / task.duration
+        slip = float(np.linalg.norm(xi[-1] - second.ends[1] / task.duration))
+        details |= {
+            "dynamics": "second order: u is torque",
+            "inertia": second.inertia,
+            "start_velocity": second.ends[0] / task.duration,
+            "fine_velocities": xi,
+            "velocity_miss": slip,
+            "velocity_peaks": tuple(float(x) for x in np.max(np.abs(xi), axis=0)),
+        }
+    solved = max(error, slip * duration) <= task.tolerance
+    return Plan(
+        group=group,
+        target=task.target,
+        controls=tuple(group.labels[i] for i in task.controls),
+        duration=duration,
+        method=method,
+        u=piecewise_linear(group, task.controls, values, duration),
+        cost=float(np.sum(a * a + a * b + b * b)) * duration / (3 * structure.intervals),
+        X_final=flight.X[-1],
+        error=error,
+        status=Status.LOCAL if solved else Status.NOT_CONVERGED,
+        seconds=seconds,
+        details=details,
+    )

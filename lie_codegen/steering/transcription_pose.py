@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,155 +11,113 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.control.positive_matrix import as_floats, positive_matrix
 from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.simulation.metric import group_element
-from lie_codegen.steering.constraints import Cone, Obstacle, check_obstacles, limits
+from lie_codegen.steering.constraints import Cone, check_obstacles, limits
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription_problem import Structure
+from lie_codegen.steering.transcription_numbers import Dynamics, Numbers, Options
+from lie_codegen.steering.transcription_structure import Structure
 
 Array = NDArray[Any]
 
-
-@dataclass(frozen=True)
-class Dynamics:
-    """Second order: J xi' = ad*_xi J xi + torque.
-
-    Attributes:
-        inertia: (n, n) J.
-        ends: xi at both ends, (n,) each.
-        speeds: lower and upper limits of xi, (n,) each.
-    """
-
-    inertia: Array
-    ends: tuple[Array, Array]
-    speeds: tuple[Array, Array]
+#: Solvers; "auto" is fatrop, and ipopt where fatrop cannot or does not.
+SOLVERS = ("auto", "fatrop", "ipopt")
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """The numbers of a problem, in units of the task's duration.
-
-    Attributes:
-        bounds, rates: lower and upper limits of the controls and of their rates, (m,) each.
-        obstacles: cones first.
-        via: (d, d) elements, in order.
-        drift: (n,).
-        weights: (m,).
-        rest: whether the controls vanish at both ends.
-        longest: duration allowed.
-        dynamics: None to first order.
-    """
-
-    bounds: tuple[Array, Array]
-    rates: tuple[Array, Array]
-    obstacles: tuple[Obstacle, ...]
-    via: tuple[Array, ...]
-    drift: Array
-    weights: Array
-    rest: bool
-    longest: float
-    dynamics: Dynamics | None
-
-    @property
-    def power(self) -> int:
-        """The power of the duration that makes a control a pure number times its unit: 1, or 2 for torques."""
-        return 1 if self.dynamics is None else 2
-
-
-def pose(
-    task: Task,
-    *,
-    bounds: Any = None,
-    rate_bounds: Any = None,
-    obstacles: Sequence[Obstacle] = (),
-    via: Sequence[tuple[float, ArrayLike]] = (),
-    drift: ArrayLike | None = None,
-    rest: bool = False,
-    periodic: bool = False,
-    objective: str = "energy",
-    longest: float = 20.0,
-    dynamics: str = "first_order",
-    inertia: Any = None,
-    velocity_bounds: Any = None,
-    start_velocity: ArrayLike | None = None,
-    end_velocity: ArrayLike | None = None,
-    weights: ArrayLike | None = None,
-    intervals: int = 64,
-    starts: int = 3,
-    solver: str = "ipopt",
-) -> tuple[Structure, Numbers]:
-    """The structure and the numbers; the options are those of `transcription`.
+def pose(task: Task, asked: Options) -> tuple[Structure, Numbers]:
+    """The structure and the numbers.
 
     Raises:
         SteeringInputError, ShapeError: about an option.
     """
     group, D, m = task.group, task.duration, len(task.controls)
     where = f"steer({group.name})"
-    for name, value, least in (("intervals", intervals, 4), ("starts", starts, 1)):
-        if operator.index(value) < least:
-            raise SteeringInputError(f"{where}: {name} must be at least {least}, got {value}")
-    if objective not in ("energy", "time"):
-        raise SteeringInputError(f'{where}: objective is "energy" or "time", got {objective!r}')
-    if solver not in ("ipopt", "fatrop"):
-        raise SteeringInputError(f'{where}: solver is "ipopt" or "fatrop", got {solver!r}')
-    low, high = limits(group, task.controls, bounds, f"{where}: bounds")
-    slow, fast = limits(group, task.controls, rate_bounds, f"{where}: rate_bounds")
-    if objective == "time" and not np.all(np.isfinite(low) & np.isfinite(high)):
+    _check_choices(asked, where)
+    low, high = limits(group, task.controls, asked.bounds, f"{where}: bounds")
+    slow, fast = limits(group, task.controls, asked.rate_bounds, f"{where}: rate_bounds")
+    if asked.objective == "time" and not np.all(np.isfinite(low) & np.isfinite(high)):
         free = [group.labels[i] for i, a, b in zip(task.controls, low, high, strict=True) if not np.isfinite(b - a)]
         raise SteeringInputError(f"{where}: minimum time needs bounds on every control; {', '.join(free)} has none")
-    if rest and (np.any(low > 0) or np.any(high < 0)):
-        raise SteeringInputError(f"{where}: rest needs bounds that allow zero")
-    nodes, elements = [], []
-    for fraction, element in via:
-        node = round(float(fraction) * intervals)
-        if not 0 < node < intervals or node in nodes:
+    for what, lower, upper in (("bounds", low, high), ("rate_bounds", slow, fast)):
+        if (asked.rest or what == "rate_bounds") and (np.any(lower > 0) or np.any(upper < 0)):
             raise SteeringInputError(
-                f"{where}: via fractions must fall on different inner nodes of {intervals} intervals, got {fraction!r}"
+                f"{where}: {'rest needs' if asked.rest else 'there must be'} {what} that allow zero"
             )
-        nodes.append(node)
-        elements.append(group_element(group, element, f"{where}: via point at {fraction}"))
-    order = [int(i) for i in np.argsort(nodes)]
-    w = np.ones(m) if weights is None else np.array(weights, dtype=float)
-    shift = np.zeros(group.dim) if drift is None else np.array(drift, dtype=float)
-    if w.shape != (m,) or not np.all(w > 0):
-        raise SteeringInputError(f"{where}: weights must be {m} positive numbers, got {weights!r}")
+    nodes, elements = _via(task, asked, where)
+    w = np.ones(m) if asked.weights is None else np.array(asked.weights, dtype=float)
+    shift = np.zeros(group.dim) if asked.drift is None else np.array(asked.drift, dtype=float)
+    if w.shape != (m,) or not np.all(np.isfinite(w)) or not np.all(w > 0):
+        raise SteeringInputError(f"{where}: weights must be {m} positive numbers, got {asked.weights!r}")
     if shift.shape != (group.dim,) or not np.all(np.isfinite(shift)):
-        raise ShapeError(f"{where}: drift must be {group.dim} finite numbers, got {drift!r}")
-    checked = check_obstacles(group, obstacles)
-    second = _dynamics(task, dynamics, inertia, velocity_bounds, (start_velocity, end_velocity), shift)
-    if periodic and solver == "fatrop":
-        raise SteeringInputError(f"{where}: periodic controls couple the ends, which fatrop cannot do; use ipopt")
-    if periodic and second is not None and np.any(second.ends[0] != second.ends[1]):
+        raise ShapeError(f"{where}: drift must be {group.dim} finite numbers, got {asked.drift!r}")
+    checked = check_obstacles(group, asked.obstacles)
+    second = _dynamics(task, asked, shift)
+    if asked.periodic and second is not None and np.any(second.ends[0] != second.ends[1]):
         raise SteeringInputError(f"{where}: a periodic manoeuvre ends with the velocity it starts with")
     unit = D if second is None else D * D
+    named = [(each, f"obstacle {number} ({type(each).__name__})") for number, each in enumerate(checked, start=1)]
+    named.sort(key=lambda pair: not isinstance(pair[0], Cone))
     structure = Structure(
         group,
         task.controls,
-        intervals,
+        asked.intervals,
         cones=sum(isinstance(each, Cone) for each in checked),
         balls=sum(not isinstance(each, Cone) for each in checked),
-        via=tuple(nodes[i] for i in order),
-        free_time=objective == "time",
-        solver=solver,
+        via=tuple(nodes),
+        free_time=asked.objective == "time",
         second_order=second is not None,
-        periodic=periodic,
+        periodic=asked.periodic,
     )
     numbers = Numbers(
         bounds=(low * unit, high * unit),
         rates=(slow * unit * D, fast * unit * D),
-        obstacles=tuple(sorted(checked, key=lambda each: not isinstance(each, Cone))),
-        via=tuple(elements[i] for i in order),
+        obstacles=tuple(each for each, _ in named),
+        obstacle_names=tuple(name for _, name in named),
+        via=tuple(elements),
         drift=shift * D,
         weights=w,
-        rest=rest,
-        longest=longest,
+        rest=asked.rest,
+        longest=float(asked.longest),
         dynamics=second,
     )
     return structure, numbers
 
 
-def _dynamics(
-    task: Task, dynamics: str, inertia: Any, speeds: Any, ends: tuple[ArrayLike | None, ArrayLike | None], drift: Array
-) -> Dynamics | None:
+def _check_choices(asked: Options, where: str) -> None:
+    for name, value, least in (("intervals", asked.intervals, 4), ("starts", asked.starts, 1)):
+        if operator.index(value) < least:
+            raise SteeringInputError(f"{where}: {name} must be at least {least}, got {value}")
+    if asked.objective not in ("energy", "time"):
+        raise SteeringInputError(f'{where}: objective is "energy" or "time", got {asked.objective!r}')
+    if asked.solver not in SOLVERS:
+        raise SteeringInputError(f'{where}: solver is "auto", "fatrop" or "ipopt", got {asked.solver!r}')
+    if asked.periodic and asked.solver == "fatrop":
+        raise SteeringInputError(f"{where}: periodic controls couple the ends, which fatrop cannot do; use ipopt")
+    if not isinstance(asked.longest, int | float | np.number) or not np.isfinite(asked.longest) or asked.longest <= 0:
+        raise SteeringInputError(f"{where}: longest must be a positive multiple of the duration, got {asked.longest!r}")
+
+
+def _via(task: Task, asked: Options, where: str) -> tuple[list[int], list[Array]]:
+    """Nodes in order, and the elements to pass through there."""
+    N, found = asked.intervals, {}
+    for pair in asked.via:
+        try:
+            fraction, element = pair
+            node = round(float(fraction) * N)
+        except (TypeError, ValueError):
+            raise SteeringInputError(
+                f"{where}: a via point is a pair (fraction of the duration, element), got {pair!r}"
+            ) from None
+        if not 0 < node < N or node in found:
+            raise SteeringInputError(
+                f"{where}: via fractions must fall on different inner nodes of {N} intervals, got {fraction!r}"
+            )
+        found[node] = group_element(task.group, element, f"{where}: via point at {fraction}")
+    return sorted(found), [found[node] for node in sorted(found)]
+
+
+def _dynamics(task: Task, asked: Options, drift: Array) -> Dynamics | None:
     where, n, D = f"steer({task.group.name})", task.group.dim, task.duration
+    dynamics, inertia, speeds = asked.dynamics, asked.inertia, asked.velocity_bounds
+    ends: tuple[ArrayLike | None, ArrayLike | None] = (asked.start_velocity, asked.end_velocity)
     if dynamics not in ("first_order", "second_order"):
         raise SteeringInputError(f'{where}: dynamics is "first_order" or "second_order", got {dynamics!r}')
     if dynamics == "first_order":

@@ -1,0 +1,99 @@
+"""What a user asks of a transcription, and its numbers in units of the task's duration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.steering.constraints import Obstacle
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a user asks for; the attributes are the options of `transcription`, which documents them."""
+
+    bounds: Any = None
+    rate_bounds: Any = None
+    obstacles: Sequence[Obstacle] = ()
+    via: Sequence[tuple[float, ArrayLike]] = ()
+    drift: ArrayLike | None = None
+    rest: bool = False
+    periodic: bool = False
+    objective: str = "energy"
+    longest: float = 20.0
+    dynamics: str = "first_order"
+    inertia: Any = None
+    velocity_bounds: Any = None
+    start_velocity: ArrayLike | None = None
+    end_velocity: ArrayLike | None = None
+    weights: ArrayLike | None = None
+    intervals: int = 64
+    starts: int = 3
+    solver: str = "auto"
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """Second order: J xi' = ad*_xi J xi + torque.
+
+    Attributes:
+        inertia: (n, n) J.
+        ends: xi at both ends, (n,) each.
+        speeds: lower and upper limits of xi, (n,) each.
+    """
+
+    inertia: Array
+    ends: tuple[Array, Array]
+    speeds: tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """The numbers of a problem, in units of the task's duration.
+
+    Attributes:
+        bounds, rates: lower and upper limits of the controls and of their rates, (m,) each.
+        obstacles: cones first.
+        obstacle_names: what messages call them, by the user's order.
+        via: (d, d) elements, in order.
+        drift: (n,).
+        weights: (m,).
+        rest: whether the controls vanish at both ends.
+        longest: duration allowed.
+        dynamics: None to first order.
+    """
+
+    bounds: tuple[Array, Array]
+    rates: tuple[Array, Array]
+    obstacles: tuple[Obstacle, ...]
+    obstacle_names: tuple[str, ...]
+    via: tuple[Array, ...]
+    drift: Array
+    weights: Array
+    rest: bool
+    longest: float
+    dynamics: Dynamics | None
+
+    @property
+    def power(self) -> int:
+        """The power of the duration that makes a control a pure number times its unit: 1, or 2 for torques."""
+        return 1 if self.dynamics is None else 2
+
+    def ratios(self, v: Array) -> Array:
+        """(k, m) how many times their bounds controls v (k, m) are; zero where there are none."""
+        return over(v, self.bounds)
+
+
+def over(values: Array, between: tuple[Array, Array]) -> Array:
+    """How many times their limits values are, 0 where there are none; infinite where a limit of 0 is passed."""
+    low, high = between
+    with np.errstate(divide="ignore", invalid="ignore"):
+        above = np.where(values > 0, values / np.maximum(high, 0), 0.0)
+        below = np.where(values < 0, values / np.minimum(low, 0), 0.0)
+    return np.asarray(np.nan_to_num(np.maximum(above, below), nan=0.0, posinf=np.inf))
