@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+import lie_codegen as lc
 from lie_codegen.control.allocation import allocate, thruster_matrix
 from lie_codegen.control.reference import formula_reference
 from lie_codegen.errors import InputError, ShapeError
@@ -145,6 +150,56 @@ def test_integral_action_removes_the_error_of_a_constant_disturbance() -> None:
     assert errors[0] > 0.05
     assert errors[1] < 1e-5
     np.testing.assert_allclose(4 * ends[1][12:], disturbance, atol=1e-4)  # K_i s balances it
+
+
+def test_the_integral_law_in_the_compiled_loop_and_its_c(tmp_path: Path) -> None:
+    """Against scipy, with a disturbance and limits that bite; and the C program drives itself to rest."""
+    so3 = load("so3")
+    J, gains = np.diag([3.0, 2, 2]), {"K_p": 8, "K_d": 6, "K_i": 4, "c": 1}
+    disturbance, R0 = [0.8, -0.5, 0.3], expm(so3.hat([0.5, 0.2, -0.4]))
+    law = integral_law(so3, inertia=J, error="so3_right", gains=gains, limits=3)
+    still = formula_reference(so3, ["0", "0", "0"])
+    run = lc.closed_loop(
+        so3, inertia=J, law=law, reference=still, external=lambda *_: disturbance, X0=R0, t=np.linspace(0, 2, 9)
+    )
+    plain, rest = function_of(law), (np.eye(3), np.zeros(3), np.zeros(3))
+
+    def rate(_, x):
+        R, w, s = x[:9].reshape(3, 3), x[9:12], x[12:]
+        out = values(plain, R, w, *rest, s)
+        w_dot = np.linalg.solve(J, out[0] + disturbance - np.cross(w, J @ w))
+        return np.concatenate([(R @ so3.hat(w)).ravel(), w_dot, out[1]])
+
+    start = np.concatenate([R0.ravel(), np.zeros(6)])
+    end = solve_ivp(rate, (0, 2), start, method="DOP853", rtol=1e-11, atol=1e-12, max_step=0.01).y[:, -1]
+    assert np.max(np.abs(run.outputs["force"])) == 3  # the limits bite
+    np.testing.assert_allclose(run.X[-1].ravel(), end[:9], atol=1e-7)
+    np.testing.assert_allclose(run.outputs["integral"][-1], end[12:], atol=1e-7)
+
+    folder = lc.generate_closed_loop(so3, tmp_path / "loop", inertia=J, law=law, reference=still, X0=R0)
+    command = [
+        "cc",
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-Iinclude",
+        "closed_loop.c",
+        "src/so3.c",
+        "-lm",
+        "-o",
+        "run",
+    ]
+    subprocess.run(command, cwd=folder, check=True)
+    subprocess.run([folder / "run"], cwd=folder, check=True, capture_output=True)
+
+
+def test_laws_with_unknown_inputs_are_refused() -> None:
+    so3 = load("so3")
+    law = integral_law(so3, inertia=[3, 2, 2], error="so3_right", gains={"K_p": 8, "K_d": 6, "K_i": 4})
+    odd = replace(law, outputs=tuple(p for p in law.outputs if p.name != "integral_dot"))
+    with pytest.raises(InputError, match="z_dot"):
+        lc.closed_loop(so3, inertia=[3, 2, 2], law=odd, t=[0, 1])
 
 
 def test_anti_windup_shortens_the_overshoot_under_limits() -> None:

@@ -31,8 +31,8 @@ from lie_codegen.kernels.wei_norman_body import WeiNormanData
 
 #: (ops, t, X, xi) -> (n,) body force.
 ForceBody = Callable[[Arithmetic, Scalar, Any, Vector], Vector]
-#: (ops, stage, t, X, xi) -> (n,) body force, stage 0, 1, 2 at t, t + h/2, t + h.
-StageForce = Callable[[Arithmetic, int, Scalar, Any, Vector], Vector]
+#: (ops, stage, t, X, xi, z) -> (n,) body force and the rate of the law's own state z; stage 0, 1, 2 at t, t + h/2, t + h.
+StageForce = Callable[[Arithmetic, int, Scalar, Any, Vector, Vector], tuple[Vector, Vector]]
 
 _ATTITUDE = ("X", "omega")
 _TRACKING = ("X", "xi", "X_d", "xi_d", "xi_d_dot")
@@ -42,7 +42,8 @@ def check_loop(law: Kernel | None, reference: Reference | None) -> None:
     """A law that can be simulated, with the reference it needs.
 
     Raises:
-        InputError: the law has other inputs than (X, omega) or (X, xi, X_d, xi_d, xi_d_dot), or lacks its reference.
+        InputError: the law has other inputs than (X, omega) or (X, xi, X_d, xi_d, xi_d_dot), each perhaps with states of
+            its own behind (an input `integral` beside an output `integral_dot`), or lacks its reference.
     """
     if law is not None and _tracks(law) and reference is None:
         raise InputError(f"the law {law.name} tracks: give it a reference")
@@ -74,19 +75,25 @@ def second_order_step(
     metric = positive_matrix(inertia, group.dim, "inertia")
     size, move = packed_size(group), Move(group)
     tracks = law is not None and _tracks(law)
+    own = () if law is None else law_states(law)
+    extent = size + group.dim + sum(port.size for port in own)
 
     def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *reference: Any) -> tuple[Any, ...]:
-        X, xi = unpack(group, state[:size]), list(state[size:])
+        X, xi, z = unpack(group, state[:size]), list(state[size : size + group.dim]), list(state[size + group.dim :])
         stages = [(_square(group, X_d), xi_d, rate) for X_d, xi_d, rate in zip(*reference, strict=True)]
 
-        def applied(ops: Arithmetic, stage: int, time: Scalar, Y: Any, eta: Vector) -> Vector:
+        def applied(
+            ops: Arithmetic, stage: int, time: Scalar, Y: Any, eta: Vector, zeta: Vector
+        ) -> tuple[Vector, Vector]:
             total: Vector = [0] * group.dim if force is None else force(ops, time, Y, eta)
             if law is None:
-                return total
-            return plus(total, law.evaluate(ops, Y, eta, *(stages[stage] if tracks else ()))[0])
+                return total, []
+            given = law.evaluate(ops, Y, eta, *(stages[stage] if tracks else ()), *_parts(own, zeta))
+            by_name = dict(zip((port.name for port in law.outputs), given, strict=True))
+            return plus(total, given[0]), [x for port in own for x in by_name[f"{port.name}_dot"]]
 
-        Theta, change = increments(ops, move, metric, applied, X, xi, t, h)
-        return ([*pack(group, move(ops, X, Theta)), *plus(xi, change)],)
+        Theta, change, drift = increments(ops, move, metric, applied, X, xi, t, h, z)
+        return ([*pack(group, move(ops, X, Theta)), *plus(xi, change), *(plus(z, drift) if z else ())],)
 
     data = WeiNormanData(group)
 
@@ -94,7 +101,8 @@ def second_order_step(
         def vector() -> list[float]:
             return [rng.uniform(-1, 1) for _ in range(group.dim)]
 
-        state = [*pack(group, random_element(group, data, rng)), *vector()]
+        rest = [rng.uniform(-1, 1) for _ in range(extent - size - group.dim)]
+        state = [*pack(group, random_element(group, data, rng)), *vector(), *rest]
         flat = [[z for row in random_element(group, data, rng) for z in row] for _ in range(3)]
         reference = (flat, [vector() for _ in range(3)], [vector() for _ in range(3)]) if tracks else ()
         return state, rng.uniform(0, 1), rng.uniform(0, 0.05), *reference
@@ -103,12 +111,14 @@ def second_order_step(
         name=name,
         namespace=group.name,
         inputs=(
-            Port("state", (size + group.dim,), description="varying entries of X, row by row, then xi"),
+            Port(
+                "state", (extent,), description="varying entries of X, row by row, then xi, then the law's own states"
+            ),
             Port("t", (), "s"),
             Port("h", (), "s"),
             *(_reference_ports(group) if tracks else ()),
         ),
-        outputs=(Port("state_next", (size + group.dim,)),),
+        outputs=(Port("state_next", (extent,)),),
         body=body,
         formula="X' = X hat(xi), I xi' = ad*_xi I xi + f: one RKMK4 step",
         source="Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)",
@@ -120,15 +130,33 @@ def _tracks(law: Kernel) -> bool:
     """Whether the law takes a reference.
 
     Raises:
-        InputError: its inputs are neither (X, omega) nor (X, xi, X_d, xi_d, xi_d_dot).
+        InputError: its inputs are neither (X, omega) nor (X, xi, X_d, xi_d, xi_d_dot), with states of its own behind.
     """
     names = tuple(port.name for port in law.inputs)
-    if names not in (_ATTITUDE, _TRACKING):
-        raise InputError(
-            f"the law {law.name} has the inputs {', '.join(names)}; a closed loop needs {', '.join(_ATTITUDE)} or "
-            f"{', '.join(_TRACKING)}"
-        )
-    return names == _TRACKING
+    results = {port.name: port.shape for port in law.outputs}
+    for known in (_TRACKING, _ATTITUDE):
+        own = law.inputs[len(known) :]
+        if names[: len(known)] == known and all(
+            len(port.shape) == 1 and results.get(f"{port.name}_dot") == port.shape for port in own
+        ):
+            return known is _TRACKING
+    raise InputError(
+        f"the law {law.name} has the inputs {', '.join(names)}; a closed loop needs {', '.join(_ATTITUDE)} or "
+        f"{', '.join(_TRACKING)}, and behind them only states of the law: vectors z with an output z_dot of their size"
+    )
+
+
+def law_states(law: Kernel) -> tuple[Port, ...]:
+    """The states of the law itself, as the integral of `integral_law`; all zero at the start."""
+    return law.inputs[len(_TRACKING if _tracks(law) else _ATTITUDE) :]
+
+
+def _parts(ports: Sequence[Port], flat: Vector) -> list[Vector]:
+    parts, start = [], 0
+    for port in ports:
+        parts.append(list(flat[start : start + port.size]))
+        start += port.size
+    return parts
 
 
 def _reference_ports(group: MatrixGroup) -> tuple[Port, ...]:
@@ -156,7 +184,7 @@ def held_force_step(group: MatrixGroup, inertia: Any, name: str = "held_force_st
 
     def body(ops: Arithmetic, state: Vector, force: Vector, h: Scalar) -> tuple[Any, ...]:
         X, xi = unpack(group, state[:size]), list(state[size:])
-        Theta, change = increments(ops, move, metric, lambda *_: list(force), X, xi, 0, h)
+        Theta, change, _ = increments(ops, move, metric, lambda *_: (list(force), []), X, xi, 0, h)
         return ([*pack(group, move(ops, X, Theta)), *plus(xi, change)],)
 
     data = WeiNormanData(group)
@@ -204,13 +232,15 @@ def increments(
     xi: Vector,
     t: Scalar,
     h: Scalar,
-) -> tuple[Vector, Vector]:
-    """Theta and the change of xi over a step; the force is told which of t, t + h/2, t + h it is asked for."""
-    group = move.group
+    z: Vector | None = None,
+) -> tuple[Vector, Vector, Vector]:
+    """Theta and the changes of xi and z over a step; the force is told which of t, t + h/2, t + h it is asked for."""
+    group, own = move.group, [] if z is None else z
 
-    def acceleration(stage: int, Y: Any, eta: Vector) -> Vector:
+    def rates(stage: int, Y: Any, eta: Vector, zeta: Vector) -> tuple[Vector, Vector]:
         time = (t, t + h / 2, t + h)[stage]
-        return acceleration_body(ops, group, inertia, eta, force(ops, stage, time, Y, eta))
+        applied, drift = force(ops, stage, time, Y, eta, zeta)
+        return acceleration_body(ops, group, inertia, eta, applied), drift
 
     def pulled(theta: Vector, eta: Vector) -> Vector:
         """Theta' = eta + [Theta, eta]/2 + [Theta, [Theta, eta]]/12, signs for X' = X hat(xi)."""
@@ -218,14 +248,14 @@ def increments(
         twice = bracket(ops, group.algebra, theta, once)
         return [e + a / 2 + b / 12 for e, a, b in zip(eta, once, twice, strict=True)]
 
-    half = h / 2
-    k1, a1 = xi, acceleration(0, X, xi)
-    theta, eta = scaled(half, k1), plus(xi, scaled(half, a1))
-    k2, a2 = pulled(theta, eta), acceleration(1, move(ops, X, theta), eta)
-    theta, eta = scaled(half, k2), plus(xi, scaled(half, a2))
-    k3, a3 = pulled(theta, eta), acceleration(1, move(ops, X, theta), eta)
-    theta, eta = scaled(h, k3), plus(xi, scaled(h, a3))
-    k4, a4 = pulled(theta, eta), acceleration(2, move(ops, X, theta), eta)
-    weights = ((k1, a1, 1), (k2, a2, 2), (k3, a3, 2), (k4, a4, 1))
-    Theta = plus(*[scaled(h * w / 6, k) for k, _, w in weights])
-    return Theta, plus(*[scaled(h * w / 6, a) for _, a, w in weights])
+    k, (a, c) = xi, rates(0, X, xi, own)
+    stages = [(k, a, c, 1)]
+    for stage, part, weight in ((1, h / 2, 2), (1, h / 2, 2), (2, h, 1)):
+        theta, eta = scaled(part, k), plus(xi, scaled(part, a))
+        zeta = plus(own, scaled(part, c)) if own else []
+        a, c = rates(stage, move(ops, X, theta), eta, zeta)
+        k = pulled(theta, eta)
+        stages.append((k, a, c, weight))
+    Theta = plus(*[scaled(h * w / 6, k) for k, _, _, w in stages])
+    change = plus(*[scaled(h * w / 6, a) for _, a, _, w in stages])
+    return Theta, change, plus(*[scaled(h * w / 6, c) for _, _, c, w in stages]) if own else []

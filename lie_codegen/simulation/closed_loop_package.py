@@ -16,7 +16,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.element_pattern import packed_size, varying_entries
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.kernels.reference_kernels import reference_kernel
-from lie_codegen.kernels.second_order_step import check_loop, held_force_step
+from lie_codegen.kernels.second_order_step import check_loop, held_force_step, law_states
 from lie_codegen.simulation.second_order import initial_states
 
 _SHOWN = 50
@@ -32,6 +32,7 @@ class LoopView:
     plant: str
     energy: str
     outputs: tuple[tuple[str, int], ...]
+    own: tuple[tuple[str, int], ...]
     entries: int
     matrix_size: int
     dim: int
@@ -62,7 +63,7 @@ def generate_closed_loop(
         folder: where to write.
         inertia, law, reference, X0, xi0: as `closed_loop`.
         duration: [s] that closed_loop.c simulates.
-        step: [s] from one call of the law to the next; its force is held between.
+        step: [s] from one call of the law to the next; its force, and the rates of states of its own, are held between.
 
     Raises:
         InputError: as `closed_loop`; a duration or step that is not positive.
@@ -102,6 +103,7 @@ def _view(
         plant="held_force_step",
         energy=energy,
         outputs=tuple((port.name, port.size) for port in law.outputs),
+        own=tuple((port.name, port.size) for port in law_states(law)),
         entries=packed_size(group),
         matrix_size=parts * d * d,
         dim=group.dim,

@@ -15,7 +15,7 @@ from lie_codegen.kernels.element_pattern import packed_size, varying_entries
 from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.kernels.reference_check import check_reference
 from lie_codegen.kernels.reference_kernels import reference_kernel
-from lie_codegen.kernels.second_order_step import ForceBody, check_loop, second_order_step
+from lie_codegen.kernels.second_order_step import ForceBody, check_loop, law_states, second_order_step
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
 
@@ -35,7 +35,8 @@ class ClosedLoop:
         t: (k,) times.
         X: (k, d, d) configurations, on the group to rounding; (k, N, d, d) for N initial states.
         xi: (k, n) body velocities; (k, N, n).
-        outputs: what the law gives along the way, by the names of its outputs (force or torque, phi, W, W_dot, V ...).
+        outputs: what the law gives along the way, by the names of its outputs (force or torque, phi, W, W_dot, V ...),
+            and its own states (integral).
         X_d, xi_d: the reference, (k, d, d) and (k, n), or None.
         steps: number of integration steps.
         error_estimate: difference to the run with twice the step, over 15 (Richardson); NaN for a fixed step.
@@ -69,7 +70,8 @@ def closed_loop(
     Args:
         group: any matrix group.
         inertia: symmetric positive definite.
-        law: an attitude or tracking law; None for an uncontrolled body.
+        law: an attitude or tracking law, perhaps with states of its own, zero at the start: inputs behind the usual ones
+            (integral) beside outputs that are their rates (integral_dot). None for an uncontrolled body.
         reference: for a tracking law.
         external: further body forces (ops, t, X, xi) -> (n,), as those of `underwater_forces`.
         X0: (d, d) or (N, d, d) initial configurations, the identity if not given.
@@ -94,13 +96,17 @@ def closed_loop(
     if reference is not None:
         check_reference(reference, float(times[0]), float(times[-1]), lib.reference)
     start, many = initial_states(group, X0, xi0)
+    if law is not None:
+        own = sum(port.size for port in law_states(law))
+        start = np.ascontiguousarray(np.concatenate([start, np.zeros((len(start), own))], axis=1))
     if step is not None:
         count = max(1, int(np.ceil((times[1] - times[0]) / step - 1e-9)))
         states, error = _run(lib, start, times, count, many), float("nan")
     else:
         states, count, error = _refined(lib, start, times, many, tolerance, group)
     X, xi = split_states(group, states)
-    outputs, X_d, xi_d = _outputs(lib, law, reference, times, X, xi, many)
+    own_states = states[..., packed_size(group) + group.dim :]
+    outputs, X_d, xi_d = _outputs(lib, law, reference, times, X, xi, own_states, many)
     return ClosedLoop(times, X, xi, outputs, X_d, xi_d, count * (len(times) - 1), error)
 
 
@@ -212,7 +218,14 @@ def _refined(
 
 
 def _outputs(
-    lib: Library, law: Kernel | None, reference: Reference | None, times: Array, X: Array, xi: Array, many: bool
+    lib: Library,
+    law: Kernel | None,
+    reference: Reference | None,
+    times: Array,
+    X: Array,
+    xi: Array,
+    own_states: Array,
+    many: bool,
 ) -> tuple[dict[str, Array], Array | None, Array | None]:
     X_d = xi_d = None
     arguments: list[Array] = []
@@ -223,6 +236,13 @@ def _outputs(
     if law is None:
         return {}, X_d, xi_d
     flat = [np.ascontiguousarray(x.reshape(-1, *x.shape[len(shape) :])) for x in (X, xi)]
-    values = lib[law.name].batch(*flat, *arguments)
+    ports = law_states(law)
+    ends = np.cumsum([port.size for port in ports], dtype=int)
+    own = (
+        dict(zip((port.name for port in ports), np.split(own_states, ends[:-1], axis=-1), strict=True)) if ports else {}
+    )
+    parts = [np.ascontiguousarray(z.reshape(-1, z.shape[-1])) for z in own.values()]
+    values = lib[law.name].batch(*flat, *arguments, *parts)
     names = [port.name for port in law.outputs]
-    return {key: v.reshape(*shape, *v.shape[1:]) for key, v in zip(names, values, strict=True)}, X_d, xi_d
+    given = {key: v.reshape(*shape, *v.shape[1:]) for key, v in zip(names, values, strict=True)}
+    return {**given, **own}, X_d, xi_d
