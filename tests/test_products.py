@@ -102,6 +102,11 @@ def test_what_is_no_definition_is_named() -> None:
         (lambda: lc.from_matrices("a", ["x"], 5), "list of matrices"),
         (lambda: lc.from_brackets("a", ["x", "y"], {("x", "y"): "y"}), "must be a mapping"),
         (lambda: lc.from_brackets("a", ["x", "y"], [1]), "must be a mapping"),
+        (lambda: lc.change_of_basis(lc.group("so3"), 3), "new label"),
+        (lambda: lc.group("so3").hat("x"), "must be an array of real numbers"),
+        (lambda: lc.group("so3").hat([1j, 0, 0]), "must be an array of real numbers"),
+        (lambda: lc.group("so3").vee("x"), "must be an array of numbers"),
+        (lambda: lc.generate(lc.group("so3"), None), "must be a path"),
     ):
         with pytest.raises(InputError, match=words):
             call()

@@ -26,6 +26,8 @@ def write_package(tree: Mapping[str, str], folder: str | Path) -> Path:
         OutputFolderError: the folder cannot be written, or holds a file that this package did not write
             or that was edited since; nothing is touched then.
     """
+    if not isinstance(folder, str | os.PathLike):
+        raise OutputFolderError(f"the folder to write must be a path, got {folder!r}")
     target = Path(folder).expanduser().absolute()
     target = target.resolve() if target.is_symlink() else target
     try:

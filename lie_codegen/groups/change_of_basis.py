@@ -33,6 +33,8 @@ def change_of_basis(
         InputError: a label of the group is unknown, a coefficient is not an exact number, or their number is wrong.
         DependentBasisError: if the combinations are linearly dependent, naming the relation.
     """
+    if not isinstance(combinations, Mapping) or not all(isinstance(row, Mapping) for row in combinations.values()):
+        raise InputError("change_of_basis: give {new label: {label of the group: coefficient}}")
     if len(combinations) != group.dim:
         raise InputError(f"{group.name}: {len(combinations)} combinations for a basis of {group.dim} elements")
     matrices = []

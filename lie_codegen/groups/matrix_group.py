@@ -77,9 +77,10 @@ class MatrixGroup:
         """x^ = sum_i x_i A_i: (..., n) -> (..., d, d).
 
         Raises:
+            InputError: if x is not an array of real numbers.
             ShapeError: if the last axis is not n.
         """
-        vector = np.asarray(x, dtype=float)
+        vector = _numbers(x, f"{self.name}.hat: x", float)
         if vector.ndim < 1 or vector.shape[-1] != self.dim:
             raise ShapeError(f"{self.name}.hat: x has shape {vector.shape}; its last axis must be {self.dim}")
         return np.tensordot(vector, self.basis, axes=(-1, 0))
@@ -88,11 +89,12 @@ class MatrixGroup:
         """The x with hat(x) = A: (..., d, d) -> (..., n).
 
         Raises:
+            InputError: if A is not an array of numbers.
             ShapeError: if the last two axes are not (d, d).
             NotFiniteError: for NaN or infinity.
             NotInAlgebraError: if A is not in the algebra to 1e-9 of its size.
         """
-        matrix = np.asarray(A, dtype=complex)
+        matrix = _numbers(A, f"{self.name}.vee: A", complex)
         d = self.degree
         if matrix.shape[-2:] != (d, d):
             raise ShapeError(f"{self.name}.vee: A has shape {matrix.shape}; its last axes must be ({d}, {d})")
@@ -143,3 +145,11 @@ def require_group(value: object, where: str) -> MatrixGroup:
     if isinstance(value, MatrixGroup):
         return value
     raise InputError(f"{where}: expected a group, got {value!r}; make one with lc.group(name) or lc.from_matrices(...)")
+
+
+def _numbers(values: ArrayLike, what: str, kind: type) -> Array:
+    try:
+        return np.asarray(values, dtype=kind)
+    except (TypeError, ValueError):
+        real = "real numbers" if kind is float else "numbers"
+        raise InputError(f"{what} must be an array of {real}, got {values!r:.60}") from None
