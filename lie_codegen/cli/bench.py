@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 def bench(
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
-    only: Annotated[str, typer.Option(help='Only kernels with this text in "group kernel".')] = "",
+    only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
     json: Json = False,
 ) -> None:
-    """Time calls, batches, trajectories and cold starts against numba, jax, CasADi, numpy, ...; ratios to ours."""
+    """Time calls, batches, loops and cold starts against numba, jax, SymForce, CasADi, ...; ratios to ours."""
     from lie_codegen.studies.bench import bench as measure
 
     with progress("bench") as report:
@@ -31,17 +31,17 @@ def _text(result: Bench) -> str:
     lines = [
         result.machine,
         f"one core reads {result.limits.read / 1e9:.1f} GB/s and does {result.limits.operations / 1e9:.1f} GFLOP/s",
-        "ratios to lie_codegen within a round: min / median / max",
+        "median, and ratio to lie_codegen within a round: min / median / max",
     ]
     for row in result.rows:
         lines += ["", f"{row.area}: {row.what}, {row.unit}" + (f" ({row.note})" if row.note else "")]
         for name, timing in row.timings.items():
             ratio = timing.ratio
             lines.append(
-                f"  {name:32} {timing.nanoseconds.middle:12.1f}   {ratio.low:9.2f} /{ratio.middle:9.2f} /{ratio.high:9.2f}"
+                f"  {name:32} {timing.nanoseconds.middle:14.1f}   {ratio.low:9.2f} /{ratio.middle:9.2f} /{ratio.high:9.2f}"
             )
-    lines += ["", "cold start of a process to its first so3 exp, seconds (min / median / max)"]
-    lines += [f"  {name:6} {s.low:.2f} / {s.middle:.2f} / {s.high:.2f}" for name, s in result.cold_start.items()]
+        lines += [f"  {name:32} -  {reason}" for name, reason in row.skipped.items()]
+    lines += [f"\n{title}: {reason}" for title, reason in result.failed.items()]
     return "\n".join(lines)
 
 

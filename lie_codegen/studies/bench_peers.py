@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import importlib
 import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,13 @@ from lie_codegen.codegen.opcodes import Target
 from lie_codegen.codegen.tape import tape_of
 from lie_codegen.codegen.templates import render, template_folder
 from lie_codegen.codegen.views import kernel_view
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, MissingDependencyError
 from lie_codegen.kernels.kernel import Kernel
-from lie_codegen.runtime.compiler import compile_library, find_compilers
+from lie_codegen.runtime.compiler import Compiler, compile_library, find_compilers
+from lie_codegen.studies.bench_rows import AbsentError
 
 #: What a C programmer would choose.
 FLAGS = ("-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
-Work = Callable[[], object]
 
 _BOTH = {
     "ADD": "{0} + {1}", "SUB": "{0} - {1}", "MUL": "{0} * {1}", "DIV": "{0} / {1}", "NEG": "-{0}", "INV": "1.0 / {0}",
@@ -43,9 +43,15 @@ ARRAYS = Target(
 )  # fmt: skip
 
 
-def installed(name: str) -> Any:
-    """The module, or None."""
-    return importlib.import_module(name) if importlib.util.find_spec(name) else None
+def need(name: str) -> Any:
+    """The module of a peer.
+
+    Raises:
+        AbsentError: it is not installed.
+    """
+    if importlib.util.find_spec(name.partition(".")[0]) is None:
+        raise AbsentError("not installed")
+    return importlib.import_module(name)
 
 
 def as_python(kernel: Kernel, folder: Path, module: str, *, scalars: bool) -> Any:
@@ -81,14 +87,21 @@ def as_casadi_c(kernel: Kernel, folder: Path) -> tuple[ctypes.CDLL, Any]:
     main = f"{kernel.symbol}_loop.c"
     (folder / main).write_text(render("bench_loop.c.jinja", kernel=view, work=function.sz_w() + 8), encoding="utf-8")
     output = f"{kernel.symbol}_loop.so"
-    compile_library(find_compilers()[0], folder, main, output, FLAGS)
+    compile_library(_compiler(), folder, main, output, FLAGS)
     return ctypes.CDLL(str(folder / output)), ca.external(kernel.symbol, str(folder / output))
+
+
+def _compiler() -> Compiler:
+    compilers = find_compilers()
+    if not compilers:
+        raise MissingDependencyError("the benchmark needs a C compiler")
+    return compilers[0]
 
 
 def hand_written(folder: Path) -> ctypes.CDLL:
     """The hand-written loop and the limits of the machine."""
     (folder / "hand.c").write_text((template_folder() / "bench_hand.c").read_text(encoding="utf-8"), encoding="utf-8")
-    compile_library(find_compilers()[0], folder, "hand.c", "hand.so", (*FLAGS, "-ffp-contract=fast"))
+    compile_library(_compiler(), folder, "hand.c", "hand.so", (*FLAGS, "-ffp-contract=fast"))
     library = ctypes.CDLL(str(folder / "hand.so"))
     library.read_all.restype = library.multiply_add.restype = ctypes.c_double
     return library
@@ -105,10 +118,12 @@ def sizes(values: Sequence[int]) -> Any:
 
 
 def jax_modules() -> tuple[Any, Any]:
-    """jax with 64 bits on the processor, and jax.numpy; None where it is not installed."""
-    jax = installed("jax")
-    if jax is None:
-        return None, None
+    """jax with 64 bits on one core, and jax.numpy.
+
+    Raises:
+        AbsentError: it is not installed.
+    """
+    jax = need("jax")
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_platforms", "cpu")
     return jax, importlib.import_module("jax.numpy")
