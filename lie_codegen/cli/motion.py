@@ -1,4 +1,4 @@
-"""Commands about motion: simulate, steer, reproduce."""
+"""Commands about motion: simulate, reproduce; steer has its own file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import typer
 
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit, progress
-from lie_codegen.errors import InputError, OutputFolderError, ShapeError
+from lie_codegen.cli.steering import steer
+from lie_codegen.errors import InputError, OutputFolderError
 
 _Optional = typer.Option
 
@@ -64,47 +65,6 @@ def _write_csv(path: Path, t: Any, X: Any) -> None:
         np.savetxt(path, np.column_stack([t, flat]), delimiter=",", header="t, entries of X row by row", fmt="%.17g")
     except OSError as error:
         raise OutputFolderError(f"{path} cannot be written: {error.strerror or error}") from None
-
-
-def steer(
-    group: GroupName,
-    target: Annotated[
-        str, _Optional(help="Coordinates of the second kind: comma-separated numbers, pi and sqrt allowed.")
-    ],
-    controls: Annotated[str, _Optional(help="Comma-separated labels of the actuated basis elements.")],
-    duration: Annotated[float, _Optional(help="Seconds.")] = 1.0,
-    method: Annotated[str, _Optional(help="Steering method.")] = "optimal",
-    samples: Annotated[int, _Optional(help="Number of control samples in the JSON object.")] = 101,
-    json: Json = False,
-) -> None:
-    """Steer from the identity to a target."""
-    import numpy as np
-
-    from lie_codegen.algebra.expression import parse_number
-    from lie_codegen.groups.catalogue_load import group as load
-    from lie_codegen.steering.front import steer as plan_steering
-
-    g = load(group)
-    numbers = [parse_number(part) for part in target.split(",")]
-    if len(numbers) != g.dim or any(number.is_real is not True for number in numbers):
-        raise ShapeError(f"steer: --target needs {g.dim} real numbers for {', '.join(g.labels)}, got {target!r}")
-    names = [name.strip() for name in controls.split(",")]
-    plan = plan_steering(g, [float(number) for number in numbers], names, duration, method)
-    t = np.linspace(0, duration, max(2, samples))
-    data = {
-        "group": g.name,
-        "method": plan.method,
-        "status": plan.status,
-        "cost": plan.cost,
-        "error": plan.error,
-        "X_final": plan.X_final,
-        "seconds": plan.seconds,
-        "details": plan.details,
-        "t": t,
-        "u": plan.u(t),
-    }
-    text = f"{g.name}, {plan.method}: energy {plan.cost:.9g}, endpoint error {plan.error:.3g}\n{plan.status}"
-    emit(text, data, json)
 
 
 def reproduce(

@@ -1,0 +1,83 @@
+"""Numbers, limits, via points and obstacles as they are written on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from lie_codegen.errors import InputError, ShapeError
+
+if TYPE_CHECKING:
+    from lie_codegen.steering.constraints import Ball, Cone
+
+Limits = float | tuple[float, float]
+
+
+def numbers(text: str, option: str, labels: Sequence[str] = ()) -> list[float]:
+    """Comma-separated real numbers, exact arithmetic, pi and sqrt allowed; one for each label, if labels are given.
+
+    Raises:
+        ShapeError: not real, or not as many as labels.
+        ExpressionError: naming the column.
+    """
+    from lie_codegen.algebra.expression import parse_number
+
+    values = [parse_number(part) for part in text.split(",")]
+    if (labels and len(values) != len(labels)) or any(value.is_real is not True for value in values):
+        wanted = f"{len(labels)} real numbers for {', '.join(labels)}" if labels else "real numbers, comma-separated"
+        raise ShapeError(f"steer: {option} needs {wanted}, got {text!r}")
+    return [float(value) for value in values]
+
+
+def limits_of(text: str, option: str) -> Limits | dict[str, Limits]:
+    """ "0.5", "-1:2" or "w1=0.5,w2=-1:2"."""
+    if "=" not in text:
+        return _limit(text, option)
+    parts = [part.split("=") for part in text.split(",")]
+    if any(len(part) != 2 for part in parts):
+        raise InputError(f"steer: {option} needs a number, low:high, or label=either, comma-separated, got {text!r}")
+    return {label.strip(): _limit(value, option) for label, value in parts}
+
+
+def via_point(text: str) -> tuple[float, list[float]]:
+    """ "0.5@0.1,0,0": a fraction of the duration and coordinates of the second kind."""
+    fraction, coordinates = _parts(text, "--via", "FRACTION@COORDINATES", 2)
+    return _one(fraction, "--via"), numbers(coordinates, "--via")
+
+
+def obstacle_cone(text: str) -> Cone:
+    """ "0,0,1@1,0,0@0.3": a body axis, a direction of space, an angle in rad."""
+    from lie_codegen.steering.constraints import Cone
+
+    axis, direction, angle = _parts(text, "--cone", "AXIS@DIRECTION@ANGLE", 3)
+    a, d = (numbers(each, "--cone", ("x", "y", "z")) for each in (axis, direction))
+    return Cone((a[0], a[1], a[2]), (d[0], d[1], d[2]), _one(angle, "--cone"))
+
+
+def obstacle_ball(text: str) -> Ball:
+    """ "1,0.5@0.2": a center and a radius."""
+    from lie_codegen.steering.constraints import Ball
+
+    center, radius = _parts(text, "--ball", "CENTER@RADIUS", 2)
+    return Ball(tuple(numbers(center, "--ball")), _one(radius, "--ball"))
+
+
+def _limit(text: str, option: str) -> Limits:
+    ends = [_one(part, option) for part in text.split(":")]
+    if len(ends) > 2:
+        raise InputError(f"steer: {option}: a number or low:high, got {text!r}")
+    return ends[0] if len(ends) == 1 else (ends[0], ends[1])
+
+
+def _one(text: str, option: str) -> float:
+    values = numbers(text, option)
+    if len(values) != 1:
+        raise ShapeError(f"steer: {option} needs one number, got {text!r}")
+    return values[0]
+
+
+def _parts(text: str, option: str, form: str, count: int) -> list[str]:
+    parts = text.split("@")
+    if len(parts) != count:
+        raise InputError(f"steer: {option} needs {form}, got {text!r}")
+    return parts
