@@ -22,7 +22,7 @@ class Defaults:
     search_steps: int
     search_iterations: int
     polish_steps: int = 32
-    polish_iterations: int = 40
+    polish_iterations: int = 60
     search_tolerance: float = 1e-7
     tolerance: float = 1e-10
 
@@ -32,7 +32,7 @@ class Defaults:
         if dim <= 3 and depth <= 1:
             return Defaults(16, 16, 16)
         if depth <= 1:
-            return Defaults(192, 16, 16)
+            return Defaults(64, 16, 16)
         if depth == 2:
-            return Defaults(256, 24, 40)
-        return Defaults(512, 32, 100)
+            return Defaults(64, 24, 40)
+        return Defaults(512, 32, 40)

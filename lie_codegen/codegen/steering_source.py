@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.codegen.opcodes import C99_FORMS, Target, c_literal
 from lie_codegen.codegen.steering_defaults import Defaults
+from lie_codegen.codegen.steering_lengths import bracket_lengths
 from lie_codegen.codegen.tape import Tape, tape_of
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.views import StatementView, comment_lines, kernel_view
@@ -22,7 +23,6 @@ from lie_codegen.kernels.lie_poisson import shooting_kernels
 
 #: A vector of doubles, one start a lane.
 LANES = Target("V", {op: C99_FORMS[op] for op in ("ADD", "SUB", "MUL", "DIV", "NEG", "INV", "TWICE", "SQ")}, c_literal)
-_SEED_STEPS = 16
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,10 @@ class SteeringView:
     quiet_rounds: int
     is_deep: bool
     wave_size: str
-    wave_power: str
+    lengths: tuple[int, ...]
+    depth: int
+    seed_steps: int
+    relaxations: int
     kernels: tuple[LaneKernel, ...]
     defaults: Defaults
 
@@ -79,6 +82,7 @@ def steering_view(group: MatrixGroup, controls: tuple[int, ...], depth: int) -> 
     """The view of the solver of one group and its controls (positions); depth as `Controllability.depth`."""
     pairs, areas = loop_areas(group, controls)
     positions = varying_entries(group)
+    steps = 16 if depth <= 1 else 32
     d, parts = group.degree, 2 if group.is_complex else 1
     return SteeringView(
         prefix=f"{group.name}_steer",
@@ -95,9 +99,12 @@ def steering_view(group: MatrixGroup, controls: tuple[int, ...], depth: int) -> 
         first=tuple(a for a, _ in pairs),
         second=tuple(b for _, b in pairs),
         areas=tuple(tuple(c_literal(float(value)) for value in row) for row in areas),
-        cosines=tuple(c_literal(math.cos(math.pi * k / _SEED_STEPS)) for k in range(2 * _SEED_STEPS)),
+        cosines=tuple(c_literal(math.cos(math.pi * k / steps)) for k in range(2 * steps)),
         wave_size=c_literal(0.5 * depth if depth > 1 else 0.5),
-        wave_power=c_literal(0.5 / (depth + 1)),
+        lengths=bracket_lengths(group, controls),
+        depth=depth,
+        seed_steps=steps,
+        relaxations=40 if depth > 1 else 20,
         is_deep=depth > 1,
         quiet_rounds=1 if depth <= 1 else 0,
         kernels=tuple(_lane_kernel(kernel) for kernel in shooting_kernels(group, controls)),

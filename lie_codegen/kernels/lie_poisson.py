@@ -29,7 +29,8 @@ SEED_EXPONENTIAL_DEGREE = 8
 def shooting_kernels(group: MatrixGroup, controls: tuple[int, ...]) -> tuple[Kernel, ...]:
     """All that the shooting solver needs to know about a group; elements of the group are packed."""
     return (
-        coadjoint(group, controls),
+        costate_step(group, controls),
+        path_step(group, controls),
         leap(group, controls),
         flow_step(group, controls),
         column_step(group, controls),
@@ -56,15 +57,46 @@ def transport(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     )
 
 
-def coadjoint(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
-    """(u, mu) -> ad*_u mu, for controls that are given."""
+def costate_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u at the start, in the middle and at the end, mu) -> mu in the middle (third order) and at the end of a step.
+
+    Classical Runge-Kutta with its dense output; the controls are given and multiplied by h.
+    """
+    n, m = group.dim, len(controls)
+
+    def body(ops: Arithmetic, u0: Any, u1: Any, u2: Any, mu: Any) -> tuple[Any, ...]:
+        u = (u0, u1, u2)
+        steps = _stages(ops, lambda y, half: _coadjoint(group, controls, ops, u[half], y), mu)
+        weights = [ops.constant(Fraction(k, 24)) for k in (5, 4, 4, -1)]
+        middle = [y + sum_products(zip(weights, slopes, strict=True)) for y, *slopes in zip(mu, *steps, strict=True)]
+        return middle, _after(ops, mu, steps)
+
     return Kernel(
-        "coadjoint",
+        "costate_step",
         group.name,
-        (Port("u", (len(controls),)), Port("mu", (group.dim,))),
-        (Port("mu_rate", (group.dim,)),),
-        lambda ops, u, mu: (_coadjoint(group, controls, ops, u, mu),),
-        formula="mu'_j = sum_i u_i c[i, j, k] mu_k",
+        (*(Port(name, (m,)) for name in ("u0", "u1", "u2")), Port("mu", (n,))),
+        (Port("mu_middle", (n,)), Port("mu_next", (n,))),
+        body,
+        formula="a Runge-Kutta step of mu' = ad*_u mu, and mu half way",
+    )
+
+
+def path_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u at the start, in the middle and at the end, X) -> X after a Runge-Kutta step of X' = X hat(u)."""
+    size, m = packed_size(group), len(controls)
+
+    def body(ops: Arithmetic, u0: Any, u1: Any, u2: Any, X: Any) -> tuple[Any, ...]:
+        u = (u0, u1, u2)
+        steps = _stages(ops, lambda Y, half: _moving(group, controls, ops, u[half], Y), X)
+        return (_after(ops, X, steps),)
+
+    return Kernel(
+        "path_step",
+        group.name,
+        (*(Port(name, (m,)) for name in ("u0", "u1", "u2")), Port("X", (size,))),
+        (Port("X_next", (size,)),),
+        body,
+        formula="a Runge-Kutta step of X' = X hat(u)",
     )
 
 
@@ -243,14 +275,24 @@ def _runge_kutta(
     ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
 ) -> list[Scalar]:
     """y after one classical step; rate(y, k) is h f at the time k h / 2."""
-    half, sixth = ops.constant(Fraction(1, 2)), ops.constant(Fraction(1, 6))
+    return _after(ops, y, _stages(ops, rate, y))
+
+
+def _stages(
+    ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
+) -> tuple[list[Scalar], ...]:
+    half = ops.constant(Fraction(1, 2))
     k1 = rate(y, 0)
     k2 = rate([a + half * k for a, k in zip(y, k1, strict=True)], 1)
     k3 = rate([a + half * k for a, k in zip(y, k2, strict=True)], 1)
-    k4 = rate(_sum(y, k3), 2)
+    return k1, k2, k3, rate(_sum(y, k3), 2)
+
+
+def _after(ops: Arithmetic, y: Sequence[Scalar], stages: tuple[list[Scalar], ...]) -> list[Scalar]:
+    sixth = ops.constant(Fraction(1, 6))
     return [
         a + sixth * (add(first, last) + 2 * add(second, third))
-        for a, first, second, third, last in zip(y, k1, k2, k3, k4, strict=True)
+        for a, first, second, third, last in zip(y, *stages, strict=True)
     ]
 
 

@@ -24,7 +24,7 @@ class Extremals:
         jacobian: (K, n, n) [i, c]: component i of X^-1 dX(1) / d mu0_c; singular at conjugate points.
         status: (K,) SOLVED, NOT_CONVERGED or NOTHING_FOUND.
         starts, converged: (K,) starts run, and of them near an extremal to the target.
-        agreeing: (K,) of at most 8 candidates kept, those within 1 % of the best cost.
+        agreeing: (K,) converged starts within 1 % of the best cost (of the 8 cheapest candidates, which alone are kept).
         linearisations: (K,) Jacobians computed.
     """
 

@@ -59,14 +59,15 @@ class Shooter:
         """
         elements = self._elements(targets)
         w = self.check_weights(weights)
-        for name, value in (("starts", starts), ("threads", threads)):
-            if value is not None and value < 1:
-                raise InputError(f"shooting({self.group.name}): {name} must be at least 1, got {value}")
         count = self.starts if starts is None else int(starts)
-        chunks = [chunk for chunk in np.array_split(elements, min(threads, len(elements))) if len(chunk)]
-        if len(chunks) == 1:
-            only: Extremals = self._machine.solve(chunks[0], w, count)
+        if count < 1 or threads < 1:
+            raise InputError(
+                f"shooting({self.group.name}): starts and threads must be at least 1, got {count} and {threads}"
+            )
+        if threads == 1 or len(elements) <= 1:
+            only: Extremals = self._machine.solve(elements, w, count)
             return only
+        chunks = np.array_split(elements, min(threads, len(elements)))
         with ThreadPoolExecutor(len(chunks)) as pool:
             parts = list(pool.map(lambda chunk: self._machine.solve(chunk, w, count), chunks))
         names = Extremals.__dataclass_fields__
@@ -83,7 +84,9 @@ class Shooter:
     def check_weights(self, weights: ArrayLike | None) -> Array:
         """The weights as an array, ones if not given."""
         m = len(self.controls)
-        w = np.ones(m) if weights is None else np.array(weights, dtype=float)
+        if weights is None:
+            return np.ones(m)
+        w = np.array(weights, dtype=float)
         if w.shape != (m,):
             raise ShapeError(
                 f"shooting({self.group.name}): weights have shape {w.shape}; give one for each of {m} controls"
@@ -97,7 +100,7 @@ class Shooter:
         array = np.ascontiguousarray(targets, dtype=complex if self.group.is_complex else float)
         if array.ndim not in (2, 3) or array.shape[-2:] != (d, d):
             raise ShapeError(f"shooting({self.group.name}): targets have shape {array.shape}; give (..., {d}, {d})")
-        if not np.all(np.isfinite(array)):
+        if not np.isfinite(array).all():
             raise NotFiniteError(f"shooting({self.group.name}): a target holds NaN or infinity")
         return array.reshape(-1, d, d)
 
