@@ -15,7 +15,12 @@
 #define EXPORT
 #endif
 
-enum { BLOCK = 64, OWN = 16, SHARED = 128, MOST_PORTS = 32, MOST_POINTS = 8 };
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectors in the sums over a block */
+#endif
+
+/* ROW holds a block and one more moment: the end of its last step. */
+enum { BLOCK = 64, ROW = 72, OWN = 16, SHARED = 128, MOST_PORTS = 32, MOST_POINTS = 8 };
 
 typedef void (*scan_function)(ptrdiff_t, ptrdiff_t, const double *const *, const ptrdiff_t *, double *);
 typedef void (*batch_function)(ptrdiff_t, ptrdiff_t, ptrdiff_t, const double *const *, const ptrdiff_t *,
@@ -55,12 +60,18 @@ typedef struct {
 
 /* Where the doubles of the workspace go. */
 typedef struct {
-    double *turn_c, *turn_s; /* rates x points x BLOCK: the table, for steps of length table_h */
+    double *turn_c, *turn_s; /* rates x points x ROW: the table, for steps of length table_h */
     double *wave_c, *wave_s; /* the same, at the times of the block */
-    double *sum;             /* dim x BLOCK */
-    double *values;          /* trajectories x points x BLOCK x dim */
+    double *sum;             /* dim x ROW */
+    double *values;          /* trajectories x points x ROW x dim */
     double table_h;
 } Work;
+
+/* Whether u at the end of a step is read as that at the start of the next: it does not jump, and both are wanted. */
+static int shared_ends(const Signal *u, const Ports *ports)
+{
+    return u->pieces == 0 && ports->points > 1 && ports->at[0] == 0.0 && ports->at[ports->points - 1] == 1.0;
+}
 
 static double two_sum(double a, double b, double *low)
 {
@@ -123,7 +134,7 @@ static void make_table(const Signal *u, const Ports *ports, double h, Work *work
     ptrdiff_t f, p, j, place = 0;
     for (f = 0; f < u->rates; ++f) {
         for (p = 0; p < ports->points; ++p) {
-            for (j = 0; j < BLOCK; ++j, ++place) {
+            for (j = 0; j < ROW; ++j, ++place) {
                 turn(u->rate[f], u->rate_low[f], ((double)j + ports->at[p]) * h, 0.0, work->turn_c + place, work->turn_s + place);
             }
         }
@@ -134,7 +145,8 @@ static void make_table(const Signal *u, const Ports *ports, double h, Work *work
 /* cos and sin of every w_f t at every point of every step of a block, into the workspace. */
 static void make_waves(const Signal *u, const Ports *ports, const Times *times, ptrdiff_t count, Work *work)
 {
-    const ptrdiff_t eights = (count + 7) / 8 * 8;
+    const int ends = shared_ends(u, ports);
+    const ptrdiff_t eights = (count + ends + 7) / 8 * 8;
     ptrdiff_t f, p, j, k;
     if (times->even && !(fabs(work->table_h - times->h) * (double)count <= 4.5e-16 * fabs(times->time))) {
         make_table(u, ports, times->h, work);
@@ -142,8 +154,8 @@ static void make_waves(const Signal *u, const Ports *ports, const Times *times, 
     for (f = 0; f < u->rates; ++f) {
         double c0, s0;
         turn(u->rate[f], u->rate_low[f], times->time, times->low, &c0, &s0);
-        for (p = 0; p < ports->points; ++p) {
-            const ptrdiff_t place = (f * ports->points + p) * BLOCK;
+        for (p = 0; p < ports->points - ends; ++p) {
+            const ptrdiff_t place = (f * ports->points + p) * ROW;
             const double *tc = work->turn_c + place, *ts = work->turn_s + place;
             double *c = work->wave_c + place, *s = work->wave_s + place;
             if (times->even) {
@@ -159,22 +171,27 @@ static void make_waves(const Signal *u, const Ports *ports, const Times *times, 
                     const double t = two_sum(times->moment[j], ports->at[p] * times->length[j], &low);
                     turn(u->rate[f], u->rate_low[f], t, low, c + j, s + j);
                 }
+                if (ends && p == 0) {
+                    double low;
+                    const double t = two_sum(times->moment[count - 1], times->length[count - 1], &low);
+                    turn(u->rate[f], u->rate_low[f], t, low, c + count, s + count);
+                }
             }
         }
     }
 }
 
-/* sum (dim x BLOCK) += the series at point p of every step. */
+/* sum (dim x ROW) += the series at point p of every step. */
 static void add_waves(const Signal *u, const Ports *ports, ptrdiff_t count, ptrdiff_t p, const double *cosines,
     const double *sines, const Work *work)
 {
     const ptrdiff_t eights = (count + 7) / 8 * 8;
     ptrdiff_t f, i, j, k;
     for (f = 0; f < u->rates; ++f) {
-        const double *c = work->wave_c + (f * ports->points + p) * BLOCK, *s = work->wave_s + (f * ports->points + p) * BLOCK;
+        const double *c = work->wave_c + (f * ports->points + p) * ROW, *s = work->wave_s + (f * ports->points + p) * ROW;
         for (i = 0; i < u->dim; ++i) {
             const double a = cosines[f * u->dim + i], b = sines[f * u->dim + i];
-            double *sum = work->sum + i * BLOCK;
+            double *sum = work->sum + i * ROW;
             if (a != 0.0 || b != 0.0) {
                 for (j = 0; j < eights; j += 8) {
                     for (k = j; k < j + 8; ++k) {
@@ -201,28 +218,30 @@ static void add_lines(const Signal *u, const Times *times, ptrdiff_t count, doub
             const double x = (times->moment[j] - u->times[k] + at * times->length[j]) / width;
             for (i = 0; i < u->dim; ++i) {
                 const double a = left[k * u->dim + i], b = right[k * u->dim + i];
-                work->sum[i * BLOCK + j] += a == b ? a : a + x * (b - a);
+                work->sum[i * ROW + j] += a == b ? a : a + x * (b - a);
             }
         }
     }
 }
 
-/* values of one trajectory: (points, BLOCK, dim). */
+/* values of one trajectory: (points, ROW, dim). */
 static void fill(const Signal *u, const Ports *ports, const Times *times, ptrdiff_t count, ptrdiff_t who, ptrdiff_t cursor,
     Work *work, double *values)
 {
+    const int ends = shared_ends(u, ports);
     ptrdiff_t p, i, j;
-    for (p = 0; p < ports->points; ++p) {
-        memset(work->sum, 0, (size_t)(u->dim * BLOCK) * sizeof(double));
+    for (p = 0; p < ports->points - ends; ++p) {
+        const ptrdiff_t moments = count + (p == 0 ? ends : 0);
+        memset(work->sum, 0, (size_t)(u->dim * ROW) * sizeof(double));
         if (u->rates) {
-            add_waves(u, ports, count, p, u->cosines + who * u->wave_stride, u->sines + who * u->wave_stride, work);
+            add_waves(u, ports, moments, p, u->cosines + who * u->wave_stride, u->sines + who * u->wave_stride, work);
         }
         if (u->pieces) {
             add_lines(u, times, count, ports->at[p], cursor, u->left + who * u->line_stride, u->right + who * u->line_stride, work);
         }
         for (i = 0; i < u->dim; ++i) {
-            for (j = 0; j < count; ++j) {
-                values[(p * BLOCK + j) * u->dim + i] = work->sum[i * BLOCK + j];
+            for (j = 0; j < moments; ++j) {
+                values[(p * ROW + j) * u->dim + i] = work->sum[i * ROW + j];
             }
         }
     }
@@ -231,13 +250,14 @@ static void fill(const Signal *u, const Ports *ports, const Times *times, ptrdif
 /* The largest |h u| over the steps of a block. */
 static double largest(const Signal *u, const Ports *ports, const Times *times, ptrdiff_t count, const double *values)
 {
+    const ptrdiff_t points = ports->points - shared_ends(u, ports);
     double most = 0.0;
     ptrdiff_t p, i, j;
-    for (p = 0; p < ports->points; ++p) {
+    for (p = 0; p < points; ++p) {
         for (j = 0; j < count; ++j) {
             double square = 0.0;
             for (i = 0; i < u->dim; ++i) {
-                const double v = times->length[j] * values[(p * BLOCK + j) * u->dim + i];
+                const double v = times->length[j] * values[(p * ROW + j) * u->dim + i];
                 square += v * v;
             }
             most = square > most ? square : most;
@@ -269,8 +289,11 @@ static void point_inputs(const Signal *u, const Ports *ports, const Times *times
         step[k] = ports->step[k];
         in[k] = ports->in[k] ? ports->in[k] + first * step[k] + from * lane[k] : NULL;
         if (ports->point[k] >= 0) {
-            in[k] = work->values + ports->point[k] * BLOCK * u->dim;
-            lane[k] = own ? ports->points * BLOCK * u->dim : 0;
+            in[k] = work->values + ports->point[k] * ROW * u->dim;
+            if (ports->point[k] == ports->points - 1 && shared_ends(u, ports)) {
+                in[k] = work->values + u->dim;
+            }
+            lane[k] = own ? ports->points * ROW * u->dim : 0;
             step[k] = u->dim;
         } else if (k == ports->step_port || k == ports->time_port) {
             in[k] = k == ports->step_port ? times->length : times->moment;
@@ -284,17 +307,17 @@ static void point_inputs(const Signal *u, const Ports *ports, const Times *times
 EXPORT ptrdiff_t lie_codegen_drive_work(ptrdiff_t dim, ptrdiff_t rates, ptrdiff_t points, ptrdiff_t state);
 EXPORT ptrdiff_t lie_codegen_drive_work(ptrdiff_t dim, ptrdiff_t rates, ptrdiff_t points, ptrdiff_t state)
 {
-    return 4 * rates * points * BLOCK + dim * BLOCK + OWN * points * BLOCK * dim + SHARED * state * (BLOCK + 2);
+    return 4 * rates * points * ROW + dim * ROW + OWN * points * ROW * dim + SHARED * state * (BLOCK + 2);
 }
 
 static void lay_out(const Signal *u, const Ports *ports, double *space, Work *work)
 {
     work->turn_c = space;
-    work->turn_s = work->turn_c + u->rates * ports->points * BLOCK;
-    work->wave_c = work->turn_s + u->rates * ports->points * BLOCK;
-    work->wave_s = work->wave_c + u->rates * ports->points * BLOCK;
-    work->sum = work->wave_s + u->rates * ports->points * BLOCK;
-    work->values = work->sum + u->dim * BLOCK;
+    work->turn_s = work->turn_c + u->rates * ports->points * ROW;
+    work->wave_c = work->turn_s + u->rates * ports->points * ROW;
+    work->wave_s = work->wave_c + u->rates * ports->points * ROW;
+    work->sum = work->wave_s + u->rates * ports->points * ROW;
+    work->values = work->sum + u->dim * ROW;
     work->table_h = -1.0;
 }
 
@@ -315,7 +338,7 @@ EXPORT double lie_codegen_drive(scan_function scan, batch_function batch, ptrdif
     double most = 0.0, *state, *made;
     Work work;
     lay_out(u, ports, space, &work);
-    state = work.values + OWN * ports->points * BLOCK * u->dim;
+    state = work.values + OWN * ports->points * ROW * u->dim;
     made = state + SHARED * size;
     for (from = 0; from < count; from += chunk) {
         const ptrdiff_t rows = count - from < chunk ? count - from : chunk;
@@ -332,13 +355,14 @@ EXPORT double lie_codegen_drive(scan_function scan, batch_function batch, ptrdif
             const ptrdiff_t steps = block_size(grid, first);
             const int whole = grid->parts <= BLOCK;
             const ptrdiff_t every = whole ? grid->parts : steps, kept = steps / every;
+            times.moment[0] = times.length[0] = 0.0;
             block_times(grid, first, steps, &times);
             while (cursor + 1 < u->pieces && times.moment[0] + 0.5 * times.length[0] >= u->times[cursor + 1]) {
                 ++cursor;
             }
             make_waves(u, ports, &times, steps, &work);
             for (j = 0; j < (own ? rows : 1); ++j) {
-                double *values = work.values + j * ports->points * BLOCK * u->dim;
+                double *values = work.values + j * ports->points * ROW * u->dim;
                 double move;
                 fill(u, ports, &times, steps, from + j, cursor, &work, values);
                 move = largest(u, ports, &times, steps, values);

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import mpmath as mp
@@ -12,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
+from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError
 from lie_codegen.kernels.commutator_free import commutator_free_step
 from lie_codegen.kernels.kernel import Kernel, Port
@@ -312,3 +316,103 @@ def test_the_commutator_free_method_is_in_the_users_hands() -> None:
     u = lc.PeriodicInput(["cos(t)", "0", "sin(t)", "1", "0", "cos(2*t)"], period="2*pi")
     run = lib.commutator_free_step.drive(np.eye(4), u, n=4_000, h=1e-3, every=1_000)
     np.testing.assert_allclose(run, lc.simulate(se3, u, t=np.arange(5.0)).X, rtol=0, atol=1e-11)
+
+
+def test_no_steps_are_the_start(probe: Library, loop: str) -> None:
+    u = fourier_input([1.0], [[1.0, 0, 0]], [[0.0, 1, 0]])
+    start = np.array([1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(probe.seen.drive(start, u, n=0, h=0.1), [start])
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_the_driver_is_clean_under_the_sanitizers(compiler: str, tmp_path: Path) -> None:
+    """A copy of u into the state, over spans of all lengths, one run and many, on exact-sized memory."""
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    (tmp_path / "main.c").write_text(_MAIN, encoding="utf-8")
+    flags = [
+        "-std=c99",
+        "-g",
+        "-O1",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-fsanitize=address,undefined",
+        "-fno-sanitize-recover=all",
+    ]
+    command = [compiler, *flags, f"-I{template_folder()}", "main.c", "-lm", "-o", "main"]
+    made = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if "cannot find" in made.stderr:
+        pytest.skip("no sanitizer libraries")
+    assert made.returncode == 0, made.stderr
+    done = subprocess.run([str(tmp_path / "main")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+_MAIN = r"""
+#include "drive.c"
+#include <stdio.h>
+#include <stdlib.h>
+
+static void scan(ptrdiff_t n, ptrdiff_t every, const double *const *in, const ptrdiff_t *step, double *to)
+{
+    ptrdiff_t k;
+    to[0] = in[0][0];
+    for (k = 0; k < n; ++k) {
+        const double last = to[k / every];
+        to[(k + every) / every] = 0.5 * (in[1][k * step[1]] + in[2][k * step[2]]) + 0.0 * last + 0.0 * in[3][k * step[3]];
+    }
+}
+
+static void batch(ptrdiff_t count, ptrdiff_t n, ptrdiff_t every, const double *const *in, const ptrdiff_t *lane,
+    const ptrdiff_t *step, double *to)
+{
+    ptrdiff_t j;
+    for (j = 0; j < count; ++j) {
+        const double *mine[4] = {in[0] + j * lane[0], in[1] + j * lane[1], in[2] + j * lane[2], in[3] + j * lane[3]};
+        scan(n, every, mine, step, to + j * (n / every + 1));
+    }
+}
+
+int main(void)
+{
+    static const double rate[2] = {1.0, 3.0}, low[2] = {0.0, 0.0}, at[2] = {0.0, 1.0};
+    static const ptrdiff_t point[4] = {-1, 0, 1, -1}, lane[4] = {1, 0, 0, 0}, step[4] = {0, 0, 0, 0};
+    static const ptrdiff_t parts[6] = {1, 3, 63, 64, 65, 200}, counts[4] = {1, 2, 128, 130};
+    int p, c, own;
+    for (p = 0; p < 6; ++p) {
+        for (c = 0; c < 4; ++c) {
+            for (own = 0; own < 2; ++own) {
+                const ptrdiff_t count = counts[c], spans = 7;
+                double *start = calloc((size_t)count, sizeof(double)), *to = calloc((size_t)(count * (spans + 1)), sizeof(double));
+                double *a = calloc((size_t)(2 * count), sizeof(double)), *b = calloc((size_t)(2 * count), sizeof(double));
+                double *space = calloc((size_t)lie_codegen_drive_work(1, 2, 2, 1), sizeof(double)), knots[8];
+                const double *in[4] = {start, NULL, NULL, NULL};
+                Signal u = {1, 2, 0, own ? 2 : 0, 0, rate, low, a, b, NULL, NULL, NULL};
+                Grid grid = {spans, parts[p], p % 2 ? knots : NULL, 0.0, 1.0 / (double)parts[p]};
+                Ports ports = {4, 1, 3, -1, 2, at, point, in, lane, step};
+                ptrdiff_t k;
+                for (k = 0; k < 8; ++k) {
+                    knots[k] = (double)k;
+                }
+                for (k = 0; k < 2 * count; ++k) {
+                    a[k] = 1.0;
+                    b[k] = 0.5;
+                }
+                lie_codegen_drive(scan, batch, count, &u, &grid, &ports, space, to);
+                for (k = 0; k < count; ++k) {
+                    const double h = 1.0 / (double)parts[p], t = 7.0 - h;
+                    const double first = cos(t) + cos(3 * t) + 0.5 * (sin(t) + sin(3 * t));
+                    const double last = cos(7.0) + cos(21.0) + 0.5 * (sin(7.0) + sin(21.0));
+                    if (!(fabs(to[k * 8 + 7] - 0.5 * (first + last)) < 1e-13)) {
+                        fprintf(stderr, "parts %d, count %d: %.17g\n", (int)parts[p], (int)count, to[k * 8 + 7]);
+                        return 1;
+                    }
+                }
+                free(start), free(to), free(a), free(b), free(space);
+            }
+        }
+    }
+    return 0;
+}
+"""
