@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression, parse_number
+from lie_codegen.control.matrix_formula import scalar_formula
 from lie_codegen.errors import ExpressionError
 
 T, X = sp.symbols("t x")
@@ -150,3 +151,9 @@ def printed(draw: st.DrawFn, depth: int = 0) -> tuple[str, float]:
 def test_arithmetic_agrees_with_python(case: tuple[str, float]) -> None:
     text, value = case
     assert float(parse_number(text)) == value
+
+
+@pytest.mark.parametrize("text", ["1e999999999", "0^-1", "(" * 100 + "1" + ")" * 100, "", "2 $ 3", "1 +"])
+def test_formulas_of_matrices_are_as_closed(text: str) -> None:
+    with pytest.raises(ExpressionError, match="column"):
+        scalar_formula(text, {}, {}, {})

@@ -12,22 +12,14 @@ allows, nothing else: a text is data and is never evaluated as Python nor given 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import sympy as sp
 
+from lie_codegen.algebra.token_stream import Token, TokenStream
 from lie_codegen.errors import ExpressionError
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<op>\*\*|[-+*/^(),]))",
-    re.ASCII,
-)
-_MAX_LENGTH = 4000
-_MAX_DEPTH = 60
 _MAX_EXPONENT = 64
-_MAX_DIGITS = 400
 
 Function = Callable[..., sp.Expr]
 
@@ -40,13 +32,6 @@ FORMULA_FUNCTIONS: Mapping[str, Function] = {
     "acos": sp.acos, "atan": sp.atan, "atan2": sp.atan2, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
     "abs": sp.Abs,
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Token:
-    kind: str
-    text: str
-    column: int
 
 
 def parse_number(text: str) -> sp.Expr:
@@ -65,68 +50,26 @@ def parse_expression(text: str, names: Mapping[str, sp.Expr], functions: Mapping
     Raises:
         ExpressionError: for a text outside the grammar, with the column (counted from 1).
     """
-    if not isinstance(text, str):
-        raise ExpressionError(f"expected a text, got {type(text).__name__}")
-    if len(text) > _MAX_LENGTH:
-        raise ExpressionError(f"the text has {len(text)} characters; at most {_MAX_LENGTH} are read")
     return _Parser(text, names, functions).parse()
 
 
-def _tokens(text: str) -> list[_Token]:
-    tokens = []
-    position = 0
-    while text[position:].strip():
-        match = _TOKEN.match(text, position)
-        if match is None:
-            column = position + len(text[position:]) - len(text[position:].lstrip())
-            raise ExpressionError(f"column {column + 1}: {text[column]!r} is not understood in {text!r}")
-        kind = str(match.lastgroup)
-        tokens.append(_Token(kind, match.group(kind), match.start(kind) + 1))
-        position = match.end()
-    return [*tokens, _Token("end", "", len(text) + 1)]
-
-
-class _Parser:
+class _Parser(TokenStream):
     """Recursive descent; one instance a text."""
 
     def __init__(self, text: str, names: Mapping[str, sp.Expr], functions: Mapping[str, Function]) -> None:
-        self.text = text
+        super().__init__(text, ",")
         self.names = names
         self.functions = functions
-        self.tokens = _tokens(text)
-        self.index = 0
-        self.depth = 0
-
-    @property
-    def token(self) -> _Token:
-        return self.tokens[self.index]
 
     def parse(self) -> sp.Expr:
         if self.token.kind == "end":
             raise ExpressionError("column 1: the text is empty")
         value = self.expression()
-        if self.token.kind != "end":
-            raise self.error(f"{self.token.text!r} is not expected here")
+        self.end()
         return value
 
-    def error(self, what: str, token: _Token | None = None) -> ExpressionError:
-        return ExpressionError(f"column {(token or self.token).column}: {what}, in {self.text!r}")
-
-    def accept(self, *operators: str) -> str | None:
-        if self.token.kind == "op" and self.token.text in operators:
-            self.index += 1
-            return self.tokens[self.index - 1].text
-        return None
-
-    def expect(self, operator: str) -> None:
-        if self.accept(operator) is None:
-            found = repr(self.token.text) if self.token.kind != "end" else "the end"
-            raise self.error(f"expected {operator!r}, found {found}")
-
     def expression(self) -> sp.Expr:
-        self.depth += 1
-        if self.depth > _MAX_DEPTH:
-            raise self.error(f"nested more than {_MAX_DEPTH} deep")
+        self.deeper()
         value = self.term()
         while operator := self.accept("+", "-"):
             value = value + self.term() if operator == "+" else value - self.term()
@@ -154,9 +97,7 @@ class _Parser:
         if self.accept("^", "**") is None:
             return base
         token = self.token
-        self.depth += 1
-        if self.depth > _MAX_DEPTH:
-            raise self.error(f"nested more than {_MAX_DEPTH} deep")
+        self.deeper()
         exponent = self.factor()
         self.depth -= 1
         if not (exponent.is_Integer and abs(exponent) <= _MAX_EXPONENT):
@@ -179,13 +120,7 @@ class _Parser:
             return value
         raise self.error("the text ends too soon" if token.kind == "end" else f"{token.text!r} is not expected here")
 
-    def number(self, token: _Token) -> sp.Expr:
-        mantissa, _, exponent = token.text.lower().partition("e")
-        if len(mantissa) > _MAX_DIGITS or (exponent and (len(exponent) > 5 or abs(int(exponent)) > _MAX_DIGITS)):
-            raise self.error(f"a number of more than {_MAX_DIGITS} digits", token)
-        return sp.Rational(token.text)
-
-    def name(self, token: _Token) -> sp.Expr:
+    def name(self, token: Token) -> sp.Expr:
         if self.accept("("):
             function = self.functions.get(token.text)
             if function is None:
@@ -197,7 +132,7 @@ class _Parser:
         known = ", ".join(sorted(self.names)) or "none"
         raise self.error(f"no name {token.text!r}; known: {known}", token)
 
-    def call(self, token: _Token, function: Function) -> sp.Expr:
+    def call(self, token: Token, function: Function) -> sp.Expr:
         arguments = [self.expression()]
         while self.accept(","):
             arguments.append(self.expression())

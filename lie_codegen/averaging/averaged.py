@@ -18,6 +18,7 @@ from lie_codegen.averaging.floquet import floquet_magnus
 from lie_codegen.averaging.input_formulas import TIME
 from lie_codegen.averaging.nilpotent import nilpotency_step
 from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.averaging.time_series import expressions_of, functions_of
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 
@@ -77,22 +78,12 @@ class Averaged:
         Raises:
             InputError: for a sampled input; evaluate `Lambda` instead.
         """
-        waveform, n = self.u.waveform, self.group.dim
-        return tuple(
-            waveform.expressions(self._calculus, signal, n, TIME) / waveform.omega**q
-            for q, signal in enumerate(self._signals, start=1)
-        )
+        return expressions_of(self.u, self._calculus, self._signals)
 
     @cached_property
     def Lambda(self) -> list[Callable[[ArrayLike], Array]]:
         """[Lambda_1, .., Lambda_{p-1}]: functions of t, (...,) -> (..., n)."""
-        waveform, n = self.u.waveform, self.group.dim
-        omega = float(waveform.omega) if not waveform.omega.free_symbols else 1.0
-        evaluators = [waveform.evaluator(self._calculus, signal, n) for signal in self._signals]
-        return [
-            lambda t, f=evaluate, s=omega**-q: s * f(np.asarray(t, dtype=float))  # type: ignore[misc]
-            for q, evaluate in enumerate(evaluators, start=1)
-        ]
+        return functions_of(self.u, self._calculus, self._signals)
 
     @cached_property
     def exact_areas(self) -> sp.ImmutableMatrix:

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.averaging.batched_exponential import expm
 from lie_codegen.averaging.floquet import bernoulli
-from lie_codegen.averaging.input_formulas import TIME
 from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.averaging.time_series import expressions_of, functions_of
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -49,22 +49,12 @@ class Magnus:
     @cached_property
     def exact_Z(self) -> tuple[sp.ImmutableMatrix, ...]:
         """Z_1 .. Z_p, each (n, 1), as expressions in t."""
-        waveform, n = self.u.waveform, self.group.dim
-        return tuple(
-            waveform.expressions(self._calculus, signal, n, TIME) / waveform.omega**q
-            for q, signal in enumerate(self._signals, start=1)
-        )
+        return expressions_of(self.u, self._calculus, self._signals)
 
     @cached_property
     def Z(self) -> list[Callable[[ArrayLike], Array]]:
         """[Z_1, .., Z_p]: functions of t, (...,) -> (..., n)."""
-        waveform, n = self.u.waveform, self.group.dim
-        omega = float(waveform.omega) if not waveform.omega.free_symbols else 1.0
-        evaluators = [waveform.evaluator(self._calculus, signal, n) for signal in self._signals]
-        return [
-            lambda t, f=evaluate, s=omega**-q: s * f(np.asarray(t, dtype=float))  # type: ignore[misc]
-            for q, evaluate in enumerate(evaluators, start=1)
-        ]
+        return functions_of(self.u, self._calculus, self._signals)
 
     def exponent(self, eps: float, t: ArrayLike) -> Array:
         """sum_{q<=p} eps^q Z_q(t): (...,) -> (..., n)."""

@@ -14,22 +14,15 @@ never evaluated.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
 from lie_codegen.algebra.expression import FORMULA_FUNCTIONS
+from lie_codegen.algebra.token_stream import Token, TokenStream
 from lie_codegen.errors import ExpressionError
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<op>\*\*|[-+*/^()']))",
-    re.ASCII,
-)
-_MAX_LENGTH = 4000
-_MAX_DEPTH = 60
 _MAX_EXPONENT = 16
 
 Value = Any  # sp.Expr or sp.ImmutableMatrix
@@ -65,14 +58,7 @@ def matrix_formula(
     return sp.ImmutableMatrix(value)
 
 
-@dataclass
-class _Token:
-    kind: str
-    text: str
-    column: int
-
-
-class _Parser:
+class _Parser(TokenStream):
     """Recursive descent; one instance a text."""
 
     def __init__(
@@ -82,55 +68,20 @@ class _Parser:
         names: Mapping[str, sp.Expr],
         values: Mapping[str, Any],
     ) -> None:
-        if len(text) > _MAX_LENGTH:
-            raise ExpressionError(f"the text has {len(text)} characters; at most {_MAX_LENGTH} are read")
-        self.text = text
+        super().__init__(text, "'")
         self.matrices = matrices
         self.names: dict[str, Value] = {**names, "pi": sp.pi, **values}
         for name in ("X", "Xd"):
             if name in matrices:
                 self.names[name] = matrices[name]
-        self.tokens = self._tokens()
-        self.index = 0
-        self.depth = 0
-
-    def _tokens(self) -> list[_Token]:
-        tokens: list[_Token] = []
-        position = 0
-        while self.text[position:].strip():
-            match = _TOKEN.match(self.text, position)
-            if match is None:
-                rest = self.text[position:]
-                column = position + len(rest) - len(rest.lstrip())
-                raise ExpressionError(f"column {column + 1}: {self.text[column]!r} is not understood in {self.text!r}")
-            kind = str(match.lastgroup)
-            tokens.append(_Token(kind, match.group(kind), match.start(kind) + 1))
-            position = match.end()
-        return [*tokens, _Token("end", "", len(self.text) + 1)]
-
-    @property
-    def token(self) -> _Token:
-        return self.tokens[self.index]
-
-    def error(self, what: str, token: _Token | None = None) -> ExpressionError:
-        return ExpressionError(f"column {(token or self.token).column}: {what}, in {self.text!r}")
-
-    def accept(self, *operators: str) -> str | None:
-        if self.token.kind == "op" and self.token.text in operators:
-            self.index += 1
-            return self.tokens[self.index - 1].text
-        return None
 
     def parse(self) -> Value:
         value = self.sum()
-        if self.token.kind != "end":
-            raise self.error(f"{self.token.text!r} is not expected here")
+        self.end()
         return value
 
     def sum(self) -> Value:
-        self.depth += 1
-        if self.depth > _MAX_DEPTH:
-            raise self.error(f"nested more than {_MAX_DEPTH} deep")
+        self.deeper()
         value = self.term()
         while operator := self.accept("+", "-"):
             token = self.token
@@ -140,7 +91,7 @@ class _Parser:
         self.depth -= 1
         return value
 
-    def aligned(self, a: Value, b: Value, token: _Token) -> tuple[Value, Value]:
+    def aligned(self, a: Value, b: Value, token: Token) -> tuple[Value, Value]:
         if isinstance(a, sp.MatrixBase) and not isinstance(b, sp.MatrixBase):
             b = sp.eye(a.rows) * b
         elif isinstance(b, sp.MatrixBase) and not isinstance(a, sp.MatrixBase):
@@ -187,6 +138,8 @@ class _Parser:
         self.index += 1
         exponent = sign * int(token.text)
         if not isinstance(value, sp.MatrixBase):
+            if exponent < 0 and value.is_zero:
+                raise self.error("only a number other than 0 can divide", token)
             return value**exponent
         if exponent >= 0:
             return sp.ImmutableMatrix(value**exponent)
@@ -206,31 +159,26 @@ class _Parser:
         token = self.token
         if token.kind == "number":
             self.index += 1
-            return sp.Rational(token.text)
+            return self.number(token)
         if token.kind == "name":
             self.index += 1
             return self.call(token) if self.accept("(") else self.value(token)
         if self.accept("("):
             value = self.sum()
-            self.close()
+            self.expect(")")
             return value
         raise self.error("the text ends too soon" if token.kind == "end" else f"{token.text!r} is not expected here")
 
-    def close(self) -> None:
-        if self.accept(")") is None:
-            found = repr(self.token.text) if self.token.kind != "end" else "the end"
-            raise self.error(f"expected ')', found {found}")
-
-    def value(self, token: _Token) -> Value:
+    def value(self, token: Token) -> Value:
         if token.text in self.names:
             return self.names[token.text]
         raise self.error(
             f"no name {token.text!r}; known: X, Xd, their entries (X11, Xd11, Xi11, Xdi11) and parameters", token
         )
 
-    def call(self, token: _Token) -> Value:
+    def call(self, token: Token) -> Value:
         argument = self.sum()
-        self.close()
+        self.expect(")")
         if token.text in ("tr", "norm2", "skew"):
             if not isinstance(argument, sp.MatrixBase):
                 raise self.error(f"{token.text} takes a matrix", token)
