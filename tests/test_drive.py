@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.codegen.templates import template_folder
-from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import ComputationError, InputError, NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.kernels.commutator_free import commutator_free_step
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.runtime import drive
@@ -296,6 +296,11 @@ def test_refusals(probe: Library) -> None:
         (lambda: lc.simulate(lc.group("so3"), u, t=[0, 1], method="euler"), InputError, "rkmk4, commutator_free"),
         (lambda: lc.simulate(lc.group("so3"), _three(u), t=[0, 1], eps=[1, 2]), ShapeError, "eps has 2, u has 3"),
         (lambda: lc.simulate(lc.group("so3"), u, t=[0, 1], eps=[[1.0]]), ShapeError, "eps has shape"),
+        (
+            lambda: lc.simulate(lc.group("so3"), u, t=[0, 1], X0=[np.eye(3), 2 * np.eye(3)]),
+            NotOnGroupError,
+            r"X0\[1\] is not on so3: its determinant is 8",
+        ),
     ]
     for call, error, words in cases:
         with pytest.raises(error, match=words):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -25,35 +26,55 @@ def check_invariants(group: MatrixGroup, X: Array, where: str) -> None:
 
     Necessary, not sufficient: a matrix that passes may still be in another component or another group.
 
+    Args:
+        group: the group.
+        X: (d, d), or (N, d, d).
+        where: what it is, for the message.
+
     Raises:
-        NotOnGroupError: naming `where` and the condition.
+        NotOnGroupError: naming `where` (with its number, of several) and the condition.
     """
-    determinant = np.linalg.det(X)
-    if abs(determinant) < 1e-300:
-        raise NotOnGroupError(f"{where} is not on {group.name}: it is singular")
-    if not group.is_complex and determinant < 0:
-        raise NotOnGroupError(f"{where} is not on {group.name}: its determinant {determinant:.6g} is negative")
+    several = X.reshape(-1, *X.shape[-2:])
+    names = [where] if X.ndim == 2 else [f"{where}[{number}]" for number in range(len(several))]
+    determinant = np.linalg.det(several)
+    _refuse(group, np.abs(determinant) < 1e-300, names, lambda k: "it is singular")
+    if not group.is_complex:
+        _refuse(group, determinant < 0, names, lambda k: f"its determinant {determinant[k]:.6g} is negative")
     traces, right, left, forms = _kept(group)
-    size = max(1.0, float(np.max(np.abs(X))))
-    inverse = np.linalg.inv(X)
-    condition = size * max(1.0, float(np.max(np.abs(inverse))))
-    if not np.any(traces) and abs(determinant - 1) > _OFF * condition * group.degree:
-        raise NotOnGroupError(f"{where} is not on {group.name}: its determinant is {determinant:.6g}, not 1")
-    for off, what in ((X @ right - right, "a vector"), (left @ X - left, "a row vector")):
-        _refuse(group, off, size, where, f"{what} that the group fixes")
-    for form, adjoint in forms:
-        turned = X.conj().T if adjoint else X.T
-        _refuse(group, turned @ form @ X - form, size**2, where, "a form that the group preserves")
+    size = np.maximum(1.0, _largest(several))
+    inverse = np.linalg.inv(several)
+    condition = size * np.maximum(1.0, _largest(inverse))
+    if not np.any(traces):
+        off = np.abs(determinant - 1) > _OFF * condition * group.degree
+        _refuse(group, off, names, lambda k: f"its determinant is {determinant[k]:.6g}, not 1")
+    adjoints = {False: several.transpose(0, 2, 1), True: several.conj().transpose(0, 2, 1)}
+    changes = [
+        (several @ right - right, size, "a vector that the group fixes"),
+        (left @ several - left, size, "a row vector that the group fixes"),
+        *((adjoints[kind] @ form @ several - form, size**2, "a form that the group preserves") for form, kind in forms),
+    ]
     for matrix in group.basis:
-        moved = X @ matrix @ inverse
+        moved = several @ matrix @ inverse
         scale = condition * max(1.0, float(np.max(np.abs(matrix))))
-        _refuse(group, moved - group.hat(group.project(moved)), scale, where, "the algebra, under X A X^-1,")
+        changes.append((moved - group.hat(group.project(moved)), scale, "the algebra, under X A X^-1,"))
+    for change, scale, what in changes:
+        worst = _largest(change)
+        _refuse(group, worst > _OFF * scale, names, partial(_changed, what, worst))
 
 
-def _refuse(group: MatrixGroup, off: Array, scale: float, where: str, what: str) -> None:
-    worst = float(np.max(np.abs(off), initial=0.0))
-    if worst > _OFF * scale:
-        raise NotOnGroupError(f"{where} is not on {group.name}: {what} changes by {worst:.3g}")
+def _changed(what: str, worst: Array, number: int) -> str:
+    return f"{what} changes by {worst[number]:.3g}"
+
+
+def _largest(values: Array) -> Array:
+    """(N,) the largest entry of each."""
+    return np.asarray(np.max(np.abs(values), axis=(1, 2), initial=0.0))
+
+
+def _refuse(group: MatrixGroup, bad: Array, names: Sequence[str], why: Callable[[int], str]) -> None:
+    found = np.flatnonzero(bad)
+    if len(found):
+        raise NotOnGroupError(f"{names[found[0]]} is not on {group.name}: {why(int(found[0]))}")
 
 
 @lru_cache(maxsize=64)

@@ -194,6 +194,5 @@ def _initial(group: MatrixGroup, X0: ArrayLike | None) -> Array:
         )
     if not np.all(np.isfinite(start)):
         raise NotFiniteError(f"simulate({group.name}): X0 holds NaN or infinity")
-    for element in start.reshape(-1, d, d):
-        check_invariants(group, element, f"simulate({group.name}): X0")
+    check_invariants(group, start, f"simulate({group.name}): X0")
     return start
