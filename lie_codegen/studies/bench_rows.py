@@ -59,8 +59,17 @@ class Row:
     note: str = ""
 
 
-def compete(area: str, what: str, unit: str, units: int, rounds: int, entrants: Sequence[Entrant]) -> Row:
+def compete(
+    area: str, what: str, unit: str, units: int, rounds: int, entrants: Sequence[Entrant], first: int | None = None
+) -> Row:
     """Prepare the entrants, compare their results with those of the first, time those that agree in turn.
+
+    Args:
+        area, what, unit: see `Row`.
+        units: calls, samples or steps that one run does.
+        rounds: of the timing.
+        entrants: ours first.
+        first: compare this many leading rows of the results; all of them by default.
 
     Raises:
         AbsentError: the first one, ours, cannot take part.
@@ -68,11 +77,11 @@ def compete(area: str, what: str, unit: str, units: int, rounds: int, entrants: 
     ours, *others = entrants
     works: dict[str, Work] = {ours.name: ours.make()}
     shares, skipped = {ours.name: ours.share}, {}
-    wanted = flat(works[ours.name]())
+    wanted = flat(works[ours.name](), first)
     for entrant in others:
         try:
             work = entrant.make()
-            compare(wanted[entrant.part] if entrant.part else wanted, flat(work()), entrant.tolerance)
+            compare(wanted[entrant.part] if entrant.part else wanted, flat(work(), first), entrant.tolerance)
         except AbsentError as reason:
             skipped[entrant.name] = str(reason)
         except Exception as error:  # whatever a foreign library raises, the others go on
@@ -97,9 +106,9 @@ def compare(wanted: np.ndarray[Any, Any], got: np.ndarray[Any, Any], tolerance: 
         raise ComputationError(f"computes something else: {off:.2g} away from ours")
 
 
-def flat(result: Any) -> np.ndarray[Any, Any]:
-    """All numbers of a result, a tuple in order, complex ones as pairs."""
+def flat(result: Any, first: int | None = None) -> np.ndarray[Any, Any]:
+    """A copy of all numbers (of the first rows) of a result, a tuple in order, complex ones as pairs."""
     if isinstance(result, tuple | list):
-        return np.concatenate([flat(each) for each in result])
-    array = np.ascontiguousarray(np.asarray(result))
-    return array.astype(complex if array.dtype.kind == "c" else float).ravel().view(float)
+        return np.concatenate([flat(each, first) for each in result])
+    array = np.asarray(result if first is None else result[:first])
+    return np.array(array, dtype=complex if array.dtype.kind == "c" else float, order="C").ravel().view(float)
