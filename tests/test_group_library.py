@@ -145,6 +145,23 @@ def test_threads_compile_a_kernel_once(home: Path, compiles: list[str]) -> None:
     assert len(compiles) == 1
 
 
+def test_processes_that_build_at_once_agree(home: Path) -> None:
+    code = (
+        "import lie_codegen as lc; lib = lc.build('h3', kernels='all');"
+        "print(lib.exp([1, 2, 3]).tolist(), lib.wei_norman_rate([1, 2, 3], [4, 5, 6]).tolist())"
+    )
+    root = str(Path(lc.__file__).parent.parent)
+    environment = {**os.environ, "PYTHONPATH": root}
+    runs = [
+        subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment)
+        for _ in range(3)
+    ]
+    answers = {run.communicate()[0] for run in runs}
+    assert answers == {"[[1.0, 1.0, 4.0], [0.0, 1.0, 2.0], [0.0, 0.0, 1.0]] [4.0, 5.0, -2.0]\n"}
+    assert len(list((home / "entries").iterdir())) == len(KERNEL_NAMES)
+    assert not list((home / "scratch").iterdir())
+
+
 def test_a_failure_is_told_when_the_kernel_is_asked_for_and_is_not_kept(
     home: Path, compiles: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,7 +17,7 @@ class LibrarySources:
         namespace: prefix of every symbol.
         files: flat file name -> text.
         main: the file to hand to the compiler.
-        statements: number of statements, by which the runtime chooses the optimisation level.
+        statements: number of statements of the longest kernel, by which the runtime chooses the optimisation level.
         signatures: one a kernel.
         notes: what the build log says about them.
     """

@@ -100,7 +100,7 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
         namespace=namespace,
         files=files,
         main=f"{namespace}_binding.c",
-        statements=sum(len(tape.statements) for tape in tapes),
+        statements=max(len(tape.statements) for tape in tapes),
         signatures=tuple(Signature.of(kernel) for kernel in kernels),
         notes=tuple(
             f"{kernel.name}: batches call libm lane by lane for {', '.join(body.slow)}"
