@@ -49,4 +49,6 @@ def steer(
         SteeringError: the solver found nothing admissible; says what was tried.
     """
     methods = {**OPEN_LOOP, "feedback": feedback}
-    return plan_by(methods, method, make_task(group, target, controls, duration, tolerance), options)
+    torques = options.get("dynamics") == "second_order"
+    task = make_task(group, target, controls, duration, tolerance, torques=torques)
+    return plan_by(methods, method, task, options)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.algebra.controllability import Controllability, require_controllable
+from lie_codegen.algebra.controllability import Controllability, controllability, require_controllable
 from lie_codegen.errors import InputError, SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.simulation.metric import group_element
@@ -39,17 +39,23 @@ class Task:
 
 
 def make_task(
-    group: MatrixGroup, target: ArrayLike, controls: Sequence[str | int], duration: float, tolerance: float
+    group: MatrixGroup,
+    target: ArrayLike,
+    controls: Sequence[str | int],
+    duration: float,
+    tolerance: float,
+    *,
+    torques: bool = False,
 ) -> Task:
-    """The task, checked.
+    """The task, checked; whether torques reach everything depends on the inertia, and is checked with it.
 
     Raises:
         InputError: an unknown or repeated control, a duration that is not positive and finite.
-        UncontrollableError: with the growth vector and the missing directions.
+        UncontrollableError: with the growth vector and the missing directions; not for torques.
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
     """
     require_group(group, "steer")
-    report = require_controllable(group.algebra, controls)
+    report = (controllability if torques else require_controllable)(group.algebra, controls)
     if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
         raise SteeringInputError(
             f"steer({group.name}): duration must be a positive number of seconds, got {duration!r}"

@@ -40,6 +40,8 @@ def guesses(task: Task, structure: Structure, numbers: Numbers, starts: int) -> 
 
 def _shot(task: Task, structure: Structure, numbers: Numbers) -> Array | None:
     """The extremals of least energy from via point to via point, in the time each has; None where one is not found."""
+    if not task.report.controllable:
+        return None
     solver = shooter(task.group, task.controls)
     nodes = [0, *structure.via, structure.intervals]
     elements = [np.eye(task.group.degree), *numbers.via, task.target]

@@ -13,6 +13,7 @@ from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.simulation.metric import group_element
 from lie_codegen.steering.constraints import Cone, check_obstacles, limits
 from lie_codegen.steering.task import Task
+from lie_codegen.steering.torque_reach import require_torques_reach
 from lie_codegen.steering.transcription_numbers import Dynamics, Numbers, Options
 from lie_codegen.steering.transcription_structure import Structure
 
@@ -143,4 +144,6 @@ def _dynamics(task: Task, asked: Options, drift: Array) -> Dynamics | None:
                 f"{where}: velocity_bounds exclude the velocity {(xi / D).tolist()} asked for at an end"
             )
     metric = as_floats(positive_matrix(inertia, n, f"{where}: inertia"))
+    if not np.any(velocities[0]):
+        require_torques_reach(task.group, task.controls, metric)
     return Dynamics(metric, (velocities[0], velocities[1]), (low * D, high * D))

@@ -1,0 +1,69 @@
+"""What torques reach from rest: the growth of brackets of velocities is not the question there, inertia takes part.
+
+J xi' = ad*_xi J xi + sum u_a f_a, X' = X hat(xi). From rest the configurations that can be reached fill the Lie span of
+the symmetric products <x : y> = -J^-1 (ad*_x J y + ad*_y J x) of the Y_a = J^-1 f_a (Bullo, Leonard and Lewis, as cited in
+`mechanics/accessibility.py`, which has the exact test). Here in floating point, for any inertia.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import UncontrollableError
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Array = NDArray[Any]
+
+_RANK = 1e-8
+
+
+def require_torques_reach(group: MatrixGroup, controls: tuple[int, ...], inertia: Array) -> None:
+    """Nothing, if torques on the controlled components move the configuration in every direction from rest.
+
+    Raises:
+        UncontrollableError: with the dimensions that are reached and the directions that are not.
+    """
+    symmetric, reached = torque_growth(group, controls, inertia)
+    if len(reached) < group.dim:
+        projector = reached.T @ reached
+        gap = 1 - np.diag(projector)
+        missing = ", ".join(label for label, share in zip(group.labels, gap, strict=True) if share > _RANK)
+        raise UncontrollableError(
+            f"not controllable by torques on {', '.join(group.labels[i] for i in controls)}: with this inertia, from rest, "
+            f"symmetric products span {len(symmetric)} and their brackets {len(reached)} of {group.dim} dimensions; out of "
+            f"reach, at least in part: {missing}; add a torque or a start_velocity"
+        )
+
+
+def torque_growth(group: MatrixGroup, controls: tuple[int, ...], inertia: Array) -> tuple[Array, Array]:
+    """Orthonormal rows that span the closure of J^-1 f_a under symmetric products, and that closure's Lie span."""
+    c = group.algebra.structure_constants
+    inverse = np.linalg.inv(inertia)
+
+    def symmetric(x: Array, y: Array) -> Array:
+        force = np.einsum("i,ijk,k->j", x, c, inertia @ y) + np.einsum("i,ijk,k->j", y, c, inertia @ x)
+        return np.asarray(-inverse @ force)
+
+    def bracket(x: Array, y: Array) -> Array:
+        return np.asarray(np.einsum("i,j,ijk->k", x, y, c))
+
+    products = _closure(_span(inverse[list(controls)]), symmetric)
+    return products, _closure(products, bracket)
+
+
+def _closure(rows: Array, product: Any) -> Array:
+    while len(rows) < rows.shape[1]:
+        more = _span(np.vstack([rows, *(product(x, y) for x in rows for y in rows)]))
+        if len(more) == len(rows):
+            break
+        rows = more
+    return rows
+
+
+def _span(rows: Array) -> Array:
+    scaled = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    _, sizes, right = np.linalg.svd(np.where(np.linalg.norm(rows, axis=1, keepdims=True) > _RANK, scaled, 0.0))
+    return np.asarray(right[: int(np.sum(sizes > _RANK * max(1.0, float(sizes[0]))))])
