@@ -20,7 +20,7 @@ def bracket_lengths(group: MatrixGroup, controls: Sequence[int]) -> tuple[int, .
     span = np.eye(n)[list(controls)]
     lengths = np.full(n, n)
     for length in range(1, n + 1):
-        left, sizes, right = np.linalg.svd(span)
+        _, sizes, right = np.linalg.svd(span)
         inside = right[: int(np.sum(sizes > _RANK * sizes[0]))]
         outside = np.linalg.norm(np.eye(n) - inside.T @ inside, axis=1)
         lengths = np.where(outside < _RANK, np.minimum(lengths, length), lengths)

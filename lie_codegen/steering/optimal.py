@@ -123,8 +123,8 @@ def _optimality(starts: int, agreeing: int, ratio: float, conjugate: tuple[float
     else:
         first = "a strict local minimum: no conjugate point up to the target"
     return (
-        f"{first}; the cheapest extremal of {starts} starts, {agreeing} of at most 8 kept ones within 1 % of it; that "
-        "nothing is cheaper is likely, not proved"
+        f"{first}; the cheapest extremal of {starts} starts, {agreeing} of which ended within 1 % of its cost; that nothing "
+        "is cheaper is likely, not proved"
     )
 
 
