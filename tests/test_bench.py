@@ -97,7 +97,7 @@ def test_loops_agree_with_the_peers_at_hand(tmp_path: Path, monkeypatch: pytest.
 def test_calls_and_batches_agree_with_the_peers_at_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench_kernels, "LARGE", 100)
     kernel = group_kernel(lc.group("se2"), "wei_norman_rate")
-    rows = bench_kernels.kernel_rows(kernel, tmp_path, 1, bench.Limits(1e9, 1e9))
+    rows = bench_kernels.kernel_rows(kernel, tmp_path, 1, bench_peers.hand_written(tmp_path))
     assert [row.area for row in rows] == ["call", "batch", "batch"]
     for row in rows:
         _agree(row)

@@ -107,7 +107,7 @@ def section(title: str, rounds: int) -> list[Row]:
             return [trajectory_row(folder, hand, rounds)]
         if title == "Monte Carlo":
             return [monte_carlo_row(folder, hand, rounds)]
-        return kernel_rows(KERNELS[title](), folder, rounds, limits(hand))
+        return kernel_rows(KERNELS[title](), folder, rounds, hand)
 
 
 def main(title: str, rounds: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import random
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from lie_codegen.kernels.kernel import Kernel
 from lie_codegen.lowering.casadi_arithmetic import flatten, function_of
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.studies import bench_peers as peers
-from lie_codegen.studies.bench_limits import Limits
+from lie_codegen.studies.bench_limits import reading
 from lie_codegen.studies.bench_rows import AbsentError, Entrant, Row, Work, compete
 from lie_codegen.studies.bench_symforce import SymForce
 
@@ -28,7 +29,7 @@ _SWAP = [3, 4, 5, 0, 1, 2]
 Array = np.ndarray[Any, Any]
 
 
-def kernel_rows(kernel: Kernel, folder: Path, rounds: int, bounds: Limits) -> list[Row]:
+def kernel_rows(kernel: Kernel, folder: Path, rounds: int, hand: ctypes.CDLL) -> list[Row]:
     """One row of calls, one of batches of 4,096, one of a million."""
     contest = _Contest(kernel, folder)
     rows = [compete("call", kernel.symbol, "ns a call", 1, rounds, list(contest.calls()))]
@@ -36,15 +37,17 @@ def kernel_rows(kernel: Kernel, folder: Path, rounds: int, bounds: Limits) -> li
     for count in (SMALL, LARGE):
         some = rounds if count == SMALL else max(3, rounds // 4)
         entrants = [*contest.batches(count), *(contest.maps(count) if count == SMALL else ())]
-        row = compete("batch", f"{kernel.symbol}, {count}", "ns a sample", count, some, entrants, SMALL)
-        share = doubles * 8 / row.timings[_OURS].nanoseconds.low * 1e9 / bounds.read
         if count == LARGE:
-            row = Row(row.area, row.what, row.unit, row.timings, row.skipped, f"{share:.0%} of the read bandwidth")
+            entrants.append(Entrant(_READ, lambda: reading(hand, doubles * LARGE), compared=False))
+        row = compete("batch", f"{kernel.symbol}, {count}", "ns a sample", count, some, entrants, SMALL)
+        if count == LARGE:
+            row = replace(row, note=f"{row.timings[_READ].ratio.middle:.0%} of the read bandwidth")
         rows.append(row)
     return rows
 
 
 _OURS = "lie_codegen, out="
+_READ = "limit: as many bytes read"
 
 
 class _Contest:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lie_codegen.studies.bench_rows import Work
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -36,13 +38,19 @@ def limits(hand: ctypes.CDLL) -> Limits:
     data, count = np.ones(32 * 2**20 // 4), 200_000
     reads, rates = [], []
     for _ in range(9):
-        started = time.perf_counter()
+        started = time.process_time()
         hand.read_all(ctypes.c_ssize_t(data.size), ctypes.c_void_p(data.ctypes.data))
-        middle = time.perf_counter()
+        middle = time.process_time()
         hand.multiply_add(ctypes.c_ssize_t(count), ctypes.c_double(0.5))
         reads.append(data.nbytes / (middle - started))
-        rates.append(2 * 12 * 8 * count / (time.perf_counter() - middle))
+        rates.append(2 * 12 * 8 * count / (time.process_time() - middle))
     return Limits(max(reads), max(rates))
+
+
+def reading(hand: ctypes.CDLL, doubles: int) -> Work:
+    """The work of reading so many doubles once."""
+    data = np.ones(doubles)
+    return lambda: hand.read_all(ctypes.c_ssize_t(data.size), ctypes.c_void_p(data.ctypes.data))
 
 
 def keep_to_one_core() -> None:

@@ -29,6 +29,7 @@ class Entrant:
         share: of the row's units that one run does; slow ones do less.
         tolerance: to ours, relative to the largest entry or 1.
         part: of our numbers, what it computes; as many of the first as it gives, by default.
+        compared: False for a limit of the machine, which computes nothing.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Entrant:
     share: float = 1.0
     tolerance: float = 1e-9
     part: slice | None = None
+    compared: bool = True
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,8 @@ def compete(
     for entrant in others:
         try:
             work = entrant.make()
-            compare(wanted[entrant.part] if entrant.part else wanted, flat(work(), first), entrant.tolerance)
+            if entrant.compared:
+                compare(wanted[entrant.part] if entrant.part else wanted, flat(work(), first), entrant.tolerance)
         except AbsentError as reason:
             skipped[entrant.name] = str(reason)
         except Exception as error:  # whatever a foreign library raises, the others go on
