@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -107,6 +108,15 @@ def test_a_bad_group_file_is_refused_with_status_2_and_one_line(cli, case: str, 
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--duration", "0"), "duration"),
         (("--target", "0.1,0,0.3", "--controls", "w1,w2", "--method", "four_phase"), "non-zero"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--method", "magic"), "'magic'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--method", "circle", "--bounds", "1"), "no option bounds"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--bounds", "1:2:3"), "'1:2:3'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--bounds", "w1=1,2"), "label=either"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--bounds", "w9=1"), "'w9'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--via", "0.5"), "FRACTION@COORDINATES"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--cone", "0,0,1@1,0@0.3"), "3 real numbers"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--ball", "0,0,1@0.3"), "Ball"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--weights", "1,-2"), "weights"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--starts", "0"), "starts"),
     ],
 )
 def test_a_bad_steering_task_is_refused_with_status_2(
@@ -140,6 +150,31 @@ def test_steer_and_simulate_print_json(cli, tmp_path: Path) -> None:
     simulated = cli("simulate", "so3", "--u", "0", "--u", "0", "--u", "pi/2", "--end", "1", "--json")
     X = json.loads(simulated.stdout)["X_final"]
     assert max(abs(X[0][1] + 1), abs(X[1][0] - 1), abs(X[0][0])) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("method", "energy"),
+    [
+        (("--method", "circle"), 0.8 * (4 * math.pi - 0.8)),
+        (("--weights", "2,2"), 0.8 * (4 * math.pi - 0.8)),
+        (("--bounds", "w1=-9:9,w2=9", "--rest", "--via", "0.5@0.1,0.1,0.4"), None),
+    ],
+)
+def test_steer_takes_options_and_draws_a_picture(
+    cli, method: tuple[str, ...], energy: float | None, tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    task = ("--target", "0,0,0.8", "--controls", "w1,w2", "--picture", "plans/plan.png", "--json")
+    done = cli("steer", "so3", *task, *method)
+    plan = json.loads(done.stdout)
+    assert plan["error"] < 1e-7
+    if energy is not None:
+        assert plan["cost"] == pytest.approx(energy, rel=1e-6)
+    else:
+        assert plan["method"] == "transcription"
+        assert max(abs(plan["u"][0][0]), abs(plan["u"][-1][1])) < 1e-6
+    assert Path(plan["picture"]) == tmp_path / "plans" / "plan.png"
+    assert Path(plan["picture"]).stat().st_size > 20_000
 
 
 def test_average_prints_exact_coefficients_and_measures_its_order(cli, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from lie_codegen.errors import (
     UncontrollableError,
 )
 from lie_codegen.steering.averaged_end import averaged_end
+from lie_codegen.steering.four_phase import average
 from lie_codegen.steering.fourier import Family
 
 CASES = {
@@ -86,10 +87,11 @@ def test_the_averaged_endpoint_of_any_order(name: str, controls: tuple[int, ...]
             gap = np.linalg.solve(expm(family.group.hat(averaged_end(family, each, order)[0])), X) - np.eye(len(X))
             left.append(np.linalg.norm(gap))
         assert left[0] / left[1] > 0.8 * 2 ** (order + 1)
-    slope = averaged_end(family, 5 * c, 4)[1]
-    for k, e in enumerate(1e-6 * np.eye(len(c))):
-        difference = (averaged_end(family, 5 * c + e, 4)[0] - averaged_end(family, 5 * c - e, 4)[0]) / 2e-6
-        np.testing.assert_allclose(slope[:, k], difference, atol=1e-8)
+    for order in (3, 4):
+        slope = averaged_end(family, 5 * c, order)[1]
+        for k, e in enumerate(1e-6 * np.eye(len(c))):
+            ends = [averaged_end(family, 5 * c + sign * e, order)[0] for sign in (1, -1)]
+            np.testing.assert_allclose(slope[:, k], (ends[0] - ends[1]) / 2e-6, atol=1e-8)
 
 
 def test_without_retuning_a_higher_order_ends_nearer() -> None:
@@ -125,6 +127,46 @@ def test_area_rule_needs_retuning_for_brackets_of_brackets() -> None:
         lc.steer(group, g, (0, 1, 3), 1.0, method="area_rule", exact=False)
     plan = lc.steer(group, g, (0, 1, 3), 1.0, method="area_rule", harmonics=3)
     assert plan.error < 1e-10
+
+
+@pytest.mark.parametrize(("name", "controls"), [("engel", (0, 1)), ("se3", (0, 1, 3))])
+def test_area_moments_reach_brackets_of_brackets(name: str, controls: tuple[int, ...]) -> None:
+    """Order 3 from the closed form: near by averaging, exact and near the optimum when retuned."""
+    group = lc.group(name)
+    for x in np.random.default_rng(5).normal(size=(3, group.dim)):
+        target = expm(group.hat(x / np.linalg.norm(x)))
+        averaged = lc.steer(group, target, controls, 1.0, method="area_rule", harmonics=3, order=3, exact=False)
+        assert averaged.details["averaged_miss"] < 1e-8
+        plan = lc.steer(group, target, controls, 1.0, method="area_rule", harmonics=3, order=3)
+        best = lc.steer(group, target, controls, 1.0)
+        assert plan.error < 2e-11
+        assert best.cost * (1 - 1e-9) < plan.cost < 1.1 * best.cost
+
+
+@pytest.mark.parametrize(("form", "order"), [("product", 2), ("single", 3)])
+@pytest.mark.parametrize("name", ["so3", "se2", "su2"])
+def test_the_two_forms_of_the_four_phase_design(name: str, form: str, order: int) -> None:
+    """(60) and (66), target sizes (e, e, e^2): on the way both err by e^2; at the end (66), exact in phase 1, by e^3."""
+    group = lc.group(name)
+    ends, ways = [], []
+    t = np.linspace(0, 1, 101)
+    for e in (0.2, 0.1, 0.05):
+        target = expm(group.hat([0.5 * e, 0.4 * e, 0.6 * e * e]))
+        plan = lc.steer(group, target, (0, 1), 1.0, method="four_phase", form=form, q=3)
+        ends.append(plan.error)
+        z = average(plan, t)
+        factors = [z] if form == "single" else [z * np.eye(3)[k] for k in range(3)]
+        predicted = np.eye(group.degree)
+        for factor in factors:
+            predicted = predicted @ expm(group.hat(factor))
+        ways.append(np.max(np.abs(lc.simulate(group, plan.u, t=t).X - predicted)))
+    np.testing.assert_allclose(np.log2(np.array(ends[:-1]) / ends[1:]), order, atol=0.1)
+    np.testing.assert_allclose(np.log2(np.array(ways[:-1]) / ways[1:]), 2, atol=0.15)
+
+
+def test_forms_of_the_four_phase_design_are_named() -> None:
+    with pytest.raises(SteeringInputError, match="product or single"):
+        lc.steer(lc.group("so3"), (0.1, 0.1, 0.1), (0, 1), 1.0, method="four_phase", form="double")
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -26,6 +26,35 @@ def test_a_plan_is_drawn(name: str, tmp_path: Path) -> None:
     assert picture.stat().st_size > 20_000
 
 
+@pytest.mark.parametrize(
+    ("name", "controls", "method"),
+    [
+        ("so3", (0, 1), "circle"),
+        ("so3", (0, 1), "four_phase"),
+        ("se3", (0, 1, 3), "loops"),
+        ("engel", (0, 1), "loops"),
+        ("sl2", (1, 2), "feedback"),
+    ],
+)
+def test_closed_forms_are_drawn(name: str, controls: tuple[int, ...], method: str, tmp_path: Path) -> None:
+    group = lc.group(name)
+    plan = lc.steer(group, [0.2 if k % 2 else 0.3 for k in range(group.dim)], controls, 2.0, method=method)
+    assert lc.plot_plan(plan, tmp_path / "plan.png", compare=False).stat().st_size > 20_000
+
+
+def test_loops_of_a_picture_are_labelled_with_their_areas() -> None:
+    """The area of the optimal loop of a pure bracket, closed by its chord, and the moment of a figure of eight."""
+    from lie_codegen.gallery.steering_picture import draw_plan
+
+    h3 = lc.group("h3")
+    figure = draw_plan(lc.steer(h3, (0, 0, 0.7), (0, 1), 1.0, method="circle"))
+    assert "x, y: area 0.7" in [text.get_text() for text in figure.axes[1].get_legend().get_texts()]
+    plan = lc.steer(lc.group("engel"), (0, 0, 0, 0.5), (0, 1), 1.0, method="loops")
+    labels = [text.get_text() for text in draw_plan(plan).axes[1].get_legend().get_texts()]
+    [moment] = plan.details["moments"].values()
+    assert any(f"moment {moment:.4g}, [a, [a, b]]" in label for label in labels)
+
+
 def test_a_picture_that_cannot_be_written_is_an_output_error(tmp_path: Path) -> None:
     plan = lc.steer(lc.group("so3"), (0.1, 0.1, 0.1), (0, 1), 1.0)
     (tmp_path / "file").write_text("")

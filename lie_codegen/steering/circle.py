@@ -32,6 +32,7 @@ from lie_codegen.steering.task import Task
 Array = NDArray[Any]
 
 _NEGLIGIBLE = 1e-12
+_ROUNDING = 1e-28
 _ARRIVED = 1e-3
 _EXACT = 1e-11
 _STEPS = 96
@@ -114,7 +115,7 @@ def circle_law(chord: Array, area: float) -> Array:
     size = abs(area)
     if size <= _NEGLIGIBLE * length**2:
         return np.array([*chord, 0.0])
-    if length**2 <= _NEGLIGIBLE * size:
+    if length**2 <= _ROUNDING * size:
         return np.array([2 * np.sqrt(np.pi * size), 0.0, np.copysign(2 * np.pi, area)])
 
     def excess(theta: float) -> float:

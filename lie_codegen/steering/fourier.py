@@ -21,6 +21,7 @@ from lie_codegen.steering.endpoint import flow_end
 Array = NDArray[Any]
 
 _STEPS_A_HARMONIC = 96
+_MOST_FACTOR = 8  # a solver may try controls of any size
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Family:
         The endpoint is good to about 1e-9, with refine=8 to 1e-13.
         """
         steps = _STEPS_A_HARMONIC * (1 + self.harmonics)
-        steps *= max(1, int(np.sqrt(np.sum(self.energy_weights * c * c)) / 8))
+        steps *= int(np.clip(np.sqrt(np.sum(self.energy_weights * c * c)) / 8, 1, _MOST_FACTOR))
         X, s, carried = flow_end(self.group, self.controls, lambda s: self.evaluate(c, s), steps, refine)
         return X, np.einsum("kin,kp->nip", carried, self.waves(s)).reshape(self.group.dim, -1)
 
