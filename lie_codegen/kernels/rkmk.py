@@ -12,6 +12,7 @@ from lie_codegen.kernels.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernels.block_solve import add, is_zero, product
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.kernel import Body, Kernel, Port
+from lie_codegen.kernels.short_exponential import short_pattern, times_short_exp
 from lie_codegen.kernels.wei_norman_body import WeiNormanData, product_exp, rate
 
 #: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
@@ -59,9 +60,12 @@ def times_taylor_exp(
     theta: Sequence[Scalar],
     degree: int = TAYLOR_DEGREE,
 ) -> Any:
-    """X exp(hat(theta)) by Horner's rule on the Taylor polynomial: X (I + A (I + A/2 (I + A/3 ...)))."""
+    """X exp(hat(theta)) by Horner's rule on the Taylor polynomial, X (I + A (I + A/2 (I + A/3 ...))), or the short form of it."""
     size = group.degree
     generator = hat_body(group, ops, theta)
+    pattern = short_pattern(group)
+    if pattern is not None and degree > pattern.zeros + 1:
+        return times_short_exp(ops, pattern, X, generator, theta, degree)
     value: list[list[Any]] = [list(row) for row in X]
     for order in range(degree, 0, -1):
         factor = ops.constant(Fraction(1, order))
