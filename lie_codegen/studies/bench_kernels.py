@@ -22,7 +22,7 @@ from lie_codegen.studies.bench_symforce import SymForce
 
 SMALL, LARGE = 4_096, 1_000_000
 #: Above these many instructions jax and numba compile for minutes; they are left out.
-JAX_LIMIT, NUMBA_LIMIT = 1000, 1500
+JAX_LIMIT, NUMBA_LIMIT = 600, 1500
 #: (v, w) in the order (w, v) of our se3, for the peers.
 _SWAP = [3, 4, 5, 0, 1, 2]
 
