@@ -118,6 +118,9 @@ def test_kernels_can_be_had_at_once(home: Path, compiles: list[str]) -> None:
 def test_an_unknown_kernel_is_refused(home: Path, compiles: list[str]) -> None:
     with pytest.raises(InputError, match=r"no kernel expp of so3: it has product_exp"):
         lc.build("so3", kernels=("expp",))
+    with pytest.raises(InputError, match=r"no kernel expp of so3: it has exp$"):
+        lc.build(group_kernel(lc.group("so3"), "exp"), kernels=("expp",))
+    compiles.clear()
     library = lc.build("so3")
     with pytest.raises(AttributeError, match="near: exp"):
         library.expp  # noqa: B018

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from lie_codegen.errors import InputError
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.group_library import GroupLibrary, group_library
-from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.library import Library, require_kernels
 
 if TYPE_CHECKING:
     from lie_codegen.groups.matrix_group import MatrixGroup
@@ -27,8 +27,7 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = ()) -> L
     Args:
         what: a group (all its kernels), a catalogue name or the path of a group file (the same, without importing SymPy
             when the cache has it, or the package brings the C sources), a Kernel, or several Kernels of one namespace.
-        kernels: of a group: names to have compiled before this returns, side by side on the processor's cores; "all"
-            for every one.
+        kernels: names to have compiled before this returns, side by side on the processor's cores; "all" for every one.
 
     Raises:
         InputError: if it is none of these, kernels of several namespaces or with repeated names are given, or `kernels`
@@ -41,7 +40,9 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = ()) -> L
         group, given = _group_or_kernels(what)
         if group is None:
             namespace = _namespace(given)
-            return build_kernels(lambda: given, namespace=namespace, definition=None)
+            whole = build_kernels(lambda: given, namespace=namespace, definition=None)
+            require_kernels(whole, () if kernels == "all" else kernels)
+            return whole
         library = group_library(object_definition(group), lambda: group)
     library.compile(library.kernels if kernels == "all" else kernels)
     return library

@@ -13,14 +13,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lie_codegen.errors import InputError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.build import build_sources, interpreted
 from lie_codegen.runtime.cache_folder import usable_folder
 from lie_codegen.runtime.compiler import find_compilers, warn_no_compiler
 from lie_codegen.runtime.digests import digest, package_digest, templates_digest, versions
 from lie_codegen.runtime.extension import prepare_extension
-from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.library import Library, require_kernels
 from lie_codegen.runtime.prebuilt import Prebuilt, find_prebuilt
 
 if TYPE_CHECKING:
@@ -108,11 +107,13 @@ class GroupLibrary(Library):
         return function
 
     def compile(self, names: Iterable[str]) -> None:
-        """Have these kernels now: one is derived while others are compiled."""
-        wanted = list(names)
-        unknown = [name for name in wanted if name not in self.kernels]
-        if unknown:
-            raise InputError(f"no kernel {', '.join(unknown)} of {self.namespace}: it has {', '.join(self.kernels)}")
+        """Have these kernels now: one is derived while others are compiled.
+
+        Raises:
+            InputError: there is no kernel of a name.
+            CompileError: with the command and the compiler's own words.
+        """
+        wanted = require_kernels(self, names)
         if not wanted:
             return
         import os

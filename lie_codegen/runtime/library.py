@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.errors import CodegenError
+from lie_codegen.errors import CodegenError, InputError
 
 if TYPE_CHECKING:
     from lie_codegen.runtime.call import Compiled
@@ -78,6 +78,20 @@ class Library:
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
         return f"<{how} library {self.namespace}: {', '.join(self.kernels)}>"
+
+
+def require_kernels(library: Library, names: Iterable[str]) -> tuple[str, ...]:
+    """The names, if the library has a kernel of each.
+
+    Raises:
+        InputError: naming those it has not, and those it has.
+    """
+    wanted = (names,) if isinstance(names, str) else tuple(names)
+    unknown = [str(name) for name in wanted if name not in library.kernels]
+    if unknown:
+        has = ", ".join(library.kernels)
+        raise InputError(f"no kernel {', '.join(unknown)} of {library.namespace}: it has {has}")
+    return wanted
 
 
 def check_names(signatures: Sequence[Signature]) -> None:
