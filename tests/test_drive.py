@@ -24,6 +24,7 @@ from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 from lie_codegen.runtime.library import Library
+from lie_codegen.simulation import formulas
 from lie_codegen.simulation.libraries import integrators
 
 pytestmark = pytest.mark.skipif(not find_compilers(), reason="needs a C compiler")
@@ -212,6 +213,28 @@ def test_a_fast_sine_is_not_taken_for_a_constant() -> None:
     so3 = lc.group("so3")
     u = lc.PeriodicInput(["cos(256*pi*t)", "0", "0"], period="1/128")
     np.testing.assert_allclose(lc.simulate(so3, u, t=[0, 1]).X[-1], np.eye(3), atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("texts", "in_loop", "wanted"),
+    [
+        (
+            ["cos(t)^2", "sin(t)*cos(3*t)", "1/2"],
+            True,
+            lambda t: [np.cos(t) ** 2, np.sin(t) * np.cos(3 * t), 0.5 + 0 * t],
+        ),
+        (["1", "2", "3"], True, lambda t: [1 + 0 * t, 2 + 0 * t, 3 + 0 * t]),
+        (["cos(t)", "cos(sqrt(2)*t)", "0"], False, lambda t: [np.cos(t), np.cos(2**0.5 * t), 0 * t]),
+        (["exp(-t)", "t", "0"], False, lambda t: [np.exp(-t), t, 0 * t]),
+    ],
+)
+def test_formulas_of_the_command_line_become_series_where_they_are(
+    texts: list[str], in_loop: bool, wanted: Any
+) -> None:
+    u = formulas.formula_input(lc.group("so3"), texts)
+    assert (formula_input(u, 0.0, 1.0) is not None) == in_loop
+    t = np.linspace(0, 3, 7)
+    np.testing.assert_allclose(u(t), np.stack(wanted(t), axis=-1), rtol=0, atol=1e-14)
 
 
 def test_what_is_out_of_reach_is_said_at_once() -> None:

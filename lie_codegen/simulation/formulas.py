@@ -10,7 +10,9 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
-from lie_codegen.errors import ShapeError
+from lie_codegen.averaging.formula_tables import fourier_table
+from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.expressions import ExpressionEvaluator
 from lie_codegen.kernels.numpy_arithmetic import NumpyArithmetic
@@ -18,6 +20,9 @@ from lie_codegen.kernels.numpy_arithmetic import NumpyArithmetic
 
 def formula_input(group: MatrixGroup, texts: Sequence[str]) -> Callable[[Any], NDArray[np.float64]]:
     """u(t) -> (n,), vectorised, from one formula of t for each basis element.
+
+    A PeriodicInput where the formulas are sums and products of sines and cosines of commensurate rates, which compiled
+    loops evaluate themselves.
 
     Raises:
         ShapeError: not one formula for each basis element.
@@ -27,6 +32,9 @@ def formula_input(group: MatrixGroup, texts: Sequence[str]) -> Callable[[Any], N
         raise ShapeError(
             f"{group.name}: {len(texts)} formulas given, one for each of {', '.join(group.labels)} is needed"
         )
+    series = _series(texts)
+    if series is not None:
+        return series
     t = sp.Symbol("t", real=True)
     expressions = [parse_expression(text, {"t": t, "pi": sp.pi}, FORMULA_FUNCTIONS) for text in texts]
 
@@ -36,3 +44,12 @@ def formula_input(group: MatrixGroup, texts: Sequence[str]) -> Callable[[Any], N
         return np.stack([np.broadcast_to(evaluate(each), times.shape) for each in expressions], axis=-1).astype(float)
 
     return u
+
+
+def _series(texts: Sequence[str]) -> PeriodicInput | None:
+    """The formulas as a Fourier series, None where they are none."""
+    try:
+        found = PeriodicInput(tuple(texts))
+    except InputError:
+        return None
+    return None if fourier_table(found) is None else found
