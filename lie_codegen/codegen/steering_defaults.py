@@ -34,5 +34,5 @@ class Defaults:
         if depth <= 1:
             return Defaults(64, 16, 16)
         if depth == 2:
-            return Defaults(64, 24, 40, polish_iterations=100)
+            return Defaults(128, 24, 40, polish_iterations=100)
         return Defaults(512, 32, 40, polish_iterations=100)
