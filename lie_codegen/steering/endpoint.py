@@ -112,7 +112,7 @@ def sharpen(group: MatrixGroup, target: Array, x: Array, end: End) -> tuple[Arra
     """Newton's method, least change, on the fine grid, from parameters that nearly hit; the best met and what is left."""
     best, off = x, np.inf
     for _ in range(8):
-        gap, slope = _linearised(group, target, end(x, FINE))
+        gap, slope = _attempt(group, target, x, end, FINE)
         now = float(np.max(np.abs(gap)))
         if now < off:
             best, off = x, now
@@ -124,14 +124,14 @@ def sharpen(group: MatrixGroup, target: Array, x: Array, end: End) -> tuple[Arra
     return best, off
 
 
-def _attempt(group: MatrixGroup, target: Array, x: Array, end: End) -> tuple[Array, Array]:
+def _attempt(group: MatrixGroup, target: Array, x: Array, end: End, refine: int = 1) -> tuple[Array, Array]:
     """As `_linearised`; NaN where the flow leaves the range of double precision."""
     lost = np.array([np.nan])
     if not np.all(np.isfinite(x)):
         return lost, lost
     try:
         with np.errstate(all="ignore"):
-            gap, slope = _linearised(group, target, end(x, 1))
+            gap, slope = _linearised(group, target, end(x, refine))
     except np.linalg.LinAlgError:
         return lost, lost
     return (gap, slope) if np.all(np.isfinite(slope)) else (lost, lost)
