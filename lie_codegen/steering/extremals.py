@@ -21,7 +21,8 @@ class Extremals:
         mu0: (K, n) costates at t = 0.
         cost: (K,) int sum_i w_i u_i^2 dt.
         residual: (K,) |X(1) - target|, Frobenius.
-        jacobian: (K, n, n) [i, c]: component i of X^-1 dX(1) / d mu0_c; singular at conjugate points.
+        jacobian: (K, n, n) [i, c]: component i of X^-1 dX(1) / d mu0_c, to about 1e-4; singular at
+            conjugate points.
         status: (K,) SOLVED, NOT_CONVERGED or NOTHING_FOUND.
         starts, converged: (K,) starts run, and of them near an extremal to the target.
         agreeing: (K,) converged starts within 1 % of the best cost (of the 8 cheapest candidates, which alone are kept).
