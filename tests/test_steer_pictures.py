@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,18 @@ def test_closed_forms_are_drawn(name: str, controls: tuple[int, ...], method: st
     group = lc.group(name)
     plan = lc.steer(group, [0.2 if k % 2 else 0.3 for k in range(group.dim)], controls, 2.0, method=method)
     assert lc.plot_plan(plan, tmp_path / "plan.png", compare=False).stat().st_size > 20_000
+
+
+def test_the_trailer_is_moved_sideways(tmp_path: Path) -> None:
+    """Chained form is the Engel group: the true vehicle, by SciPy, ends where the plan says; Z = -(pi/2) alpha^2 beta = 1."""
+    from lie_codegen.gallery.steering_trailer import steering_trailer
+
+    numbers = steering_trailer(tmp_path).numbers
+    assert numbers["vehicle_misses_by"] < 1e-9
+    assert numbers["vehicle_misses_by_least_energy"] < 1e-8
+    assert numbers["moment"] == pytest.approx(1, rel=1e-12)
+    assert numbers["energy"] * 20 == pytest.approx(24 * math.pi**2 / (4 * math.pi) ** (2 / 3), rel=1e-12)
+    assert numbers["least_energy"] < numbers["energy"]
 
 
 def test_loops_of_a_picture_are_labelled_with_their_areas() -> None:

@@ -43,6 +43,11 @@ TARGETS = (
         "two wheels, bounded rates, a cone kept out of: optimal steering under constraints",
     ),
     Target(
+        "steering_trailer",
+        "steering_trailer",
+        "a tractor with a trailer moved sideways: the Engel group and a figure of eight",
+    ),
+    Target(
         "hessian_errors",
         "hessian_errors",
         "accuracy near the identity: exp and log with two derivatives, ours and the neighbours'",

@@ -17,6 +17,8 @@ Array = NDArray[Any]
 COLOURS = ("#1f5aa6", "#c8442f", "#3c8d5a", "#8a5aa6", "#b08a2e", "#5b6470")
 GREY = "#8a8f98"
 
+_NOTHING = 1e-9
+
 
 def draw_loops(axes: Any, plan: Plan, t: Array, velocity: Array) -> None:
     """Of a chain, each of its loops and figures of eight; of any other plan, each pair of controls with a bracket."""
@@ -55,7 +57,7 @@ def _pairs(axes: Any, plan: Plan, t: Array, velocity: Array) -> None:
 
 def _segments(axes: Any, plan: Plan, chain: Chain) -> None:
     s = np.linspace(0, 1, 401)
-    closed = [(segment, x) for segment, x in chain.parts() if isinstance(segment, Loop | FigureEight)]
+    closed = [(part, x) for part, x in chain.parts() if isinstance(part, Loop | FigureEight) and abs(x[0]) > _NOTHING]
     for (segment, x), colour in zip(closed, COLOURS * 3, strict=False):
         v = segment.velocity(x, s)
         curve = np.vstack([np.zeros(v.shape[1]), np.cumsum((v[1:] + v[:-1]) / 2, axis=0) / (len(s) - 1)])

@@ -1,8 +1,8 @@
 """method="circle": two controls that turn at a constant rate, the least energy within the area rule.
 
 To second order of averaging X(T) = exp(int u_1 A_1 + int u_2 A_2 + area [A_1, A_2]). Of all plane curves with a given chord and
-area, arcs of circles are the shortest, and driven at constant speed the cheapest (Brockett, "Control theory and
-singular Riemannian geometry", 1981): with R the rotation of the plane, unit time,
+area, arcs of circles are the shortest (Dido's problem: with a multiplier theta on the area u' = theta R(pi / 2) u), and
+driven at constant speed the cheapest: with R the rotation of the plane, unit time,
 
     u(s) = r R(theta s + phi) e_1,     chord = 2 r / theta sin(theta / 2) R(phi + theta / 2) e_1,
     area between arc and chord = r^2 (theta - sin theta) / (2 theta^2),
