@@ -28,12 +28,13 @@ Array = NDArray[Any]
 
 _SAMPLES = 65
 _SHARP = 1e-13
-_FINE = 8
+_FINE = 16
 _TRIED = 3
 _MOST_ORDER = 8
 _MOMENTS = 2
 _AGREEING = 3
 _EQUAL = 1e-6
+_FAR = 1e3
 
 
 def area_rule(
@@ -159,11 +160,19 @@ def _averaged_gap(family: Family, x: Array, order: int, c: Array) -> tuple[Array
 
 
 def _exact_gap(family: Family, task: Task, c: Array, refine: int = 1) -> tuple[Array, Array]:
-    """vee of the projection of target^-1 X(1) - I, and its derivative by c."""
+    """vee of the projection of target^-1 X(1) - I, and its derivative by c; far off where the flow leaves double precision."""
     group = task.group
-    X, slope = family.exact(c, refine)
-    relative = np.linalg.solve(task.target, X)
-    return group.project(relative - np.eye(group.degree)), group.project(relative @ group.basis).T @ slope
+    lost = np.full(group.dim, _FAR), np.zeros((group.dim, len(c)))
+    if not np.all(np.isfinite(c)):
+        return lost
+    try:
+        with np.errstate(all="ignore"):
+            X, slope = family.exact(c, refine)
+            relative = np.linalg.solve(task.target, X)
+            gap, J = group.project(relative - np.eye(group.degree)), group.project(relative @ group.basis).T @ slope
+    except np.linalg.LinAlgError:
+        return lost
+    return (gap, J) if np.all(np.isfinite(J)) else lost
 
 
 def _least_energy(

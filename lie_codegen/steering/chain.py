@@ -18,7 +18,7 @@ from lie_codegen.steering.segments import FigureEight, Loop, Segment, Straight
 Array = NDArray[Any]
 
 _NEGLIGIBLE = 1e-9
-_STEPS = 96
+_STEPS = 32
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ _NEGLIGIBLE = 1e-12
 _ROUNDING = 1e-28
 _ARRIVED = 1e-3
 _EXACT = 1e-11
-_STEPS = 96
+_STEPS = 32
 _TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 

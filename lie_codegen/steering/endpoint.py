@@ -16,13 +16,13 @@ Array = NDArray[Any]
 #: end(x, refine) -> X(1), (d, d), and vee(X^-1 dX / dx), (n, p).
 End = Callable[[Array, int], tuple[Array, Array]]
 
-#: Refinement of the grid with which endpoints are good to about 1e-13.
-FINE = 8
+#: Refinement of the grid with which endpoints are good to about 1e-13. Derivatives, of the coarse grid, serve Newton's method only.
+FINE = 16
 
 _SHARP = 2e-14
 _NEAR = 1e-5
-_ITERATIONS = 60
-_HOPELESS = 12
+_ITERATIONS = 30
+_HOPELESS = 6
 
 
 def flow_end(

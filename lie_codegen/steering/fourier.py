@@ -20,7 +20,7 @@ from lie_codegen.steering.endpoint import flow_end
 
 Array = NDArray[Any]
 
-_STEPS_A_HARMONIC = 96
+_STEPS_A_HARMONIC = 32
 _MOST_FACTOR = 8  # a solver may try controls of any size
 
 
@@ -86,7 +86,7 @@ class Family:
     def exact(self, c: Array, refine: int = 1) -> tuple[Array, Array]:
         """X(1), (d, d), and vee(X^-1 dX / dc), (n, m (1 + 2 K)), by RKMK4 and Simpson's rule.
 
-        The endpoint is good to about 1e-9, with refine=8 to 1e-13.
+        The endpoint is good to about 1e-7, with refine=16 to 1e-13.
         """
         steps = _STEPS_A_HARMONIC * (1 + self.harmonics)
         steps *= int(np.clip(np.sqrt(np.sum(self.energy_weights * c * c)) / 8, 1, _MOST_FACTOR))
