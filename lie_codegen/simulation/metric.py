@@ -18,6 +18,9 @@ Array = NDArray[Any]
 _ON_GROUP = 1e-8
 #: Nearer to the identity than this the series of the logarithm to third order is exact to rounding.
 _NEAR = 1e-5
+_BEFORE_CUT = 3.1
+_MOST_PARALLEL = 1e2
+_IN_ALGEBRA = 1e-13
 _SEED = 20
 
 
@@ -29,11 +32,33 @@ def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
         logarithm = small @ (np.eye(group.degree) - small @ (np.eye(group.degree) / 2 - small / 3))
         x = group.project(logarithm)
         return x, float(np.max(np.abs(group.hat(x) - logarithm)))
+    quick = _diagonal_log(group, matrix)
+    if quick is not None:
+        return quick, 0.0
     logarithm = np.asarray(scipy.linalg.logm(matrix))
     if not np.all(np.isfinite(logarithm)):
         return np.zeros(group.dim), float("inf")
     x = group.project(logarithm)
     return x, float(np.max(np.abs(scipy.linalg.expm(group.hat(x)) - matrix)))
+
+
+def _diagonal_log(group: MatrixGroup, matrix: Array) -> Array | None:
+    """The principal logarithm by eigenvectors, where they are far from parallel and the result is in the algebra."""
+    if not np.all(np.isfinite(matrix)):
+        return None
+    values, vectors = np.linalg.eig(matrix)
+    if np.any(values == 0) or np.any(np.abs(np.angle(values)) > _BEFORE_CUT):
+        return None
+    try:
+        inverse = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        return None
+    if np.linalg.norm(inverse) > _MOST_PARALLEL:
+        return None
+    logarithm = (vectors * np.log(values.astype(complex))) @ inverse
+    x = group.project(logarithm)
+    off = np.max(np.abs(group.hat(x) - logarithm))
+    return x if off <= _IN_ALGEBRA * max(1.0, float(np.max(np.abs(logarithm)))) else None
 
 
 def distance(group: MatrixGroup, X: ArrayLike, Y: ArrayLike) -> float:

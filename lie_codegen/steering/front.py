@@ -50,5 +50,5 @@ def steer(
     """
     methods = {**OPEN_LOOP, "feedback": feedback}
     torques = options.get("dynamics") == "second_order"
-    task = make_task(group, target, controls, duration, tolerance, torques=torques)
+    task = make_task(group, target, controls, duration, tolerance, torques=torques, drift=options.get("drift"))
     return plan_by(methods, method, task, options)

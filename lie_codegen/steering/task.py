@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.algebra.controllability import Controllability, controllability, require_controllable
-from lie_codegen.errors import InputError, SteeringInputError
+from lie_codegen.algebra.controllability import Controllability, controllability
+from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.simulation.metric import group_element
+from lie_codegen.steering.accessibility import with_drift
 
 Array = NDArray[Any]
 
@@ -27,7 +28,7 @@ class Task:
         controls: positions of the actuated basis elements.
         duration: seconds.
         tolerance: endpoint error below which a plan counts as solved.
-        report: the controllability of the controls.
+        report: the controllability of the controls; not controllable alone where a drift, or inertia, makes up for it.
     """
 
     group: MatrixGroup
@@ -46,8 +47,10 @@ def make_task(
     tolerance: float,
     *,
     torques: bool = False,
+    drift: Any = None,
 ) -> Task:
-    """The task, checked; whether torques reach everything depends on the inertia, and is checked with it.
+    """The task, checked; a drift may help controls that do not reach everything alone, and whether torques do depends on
+    the inertia, and is checked with it.
 
     Raises:
         InputError: an unknown or repeated control, a duration that is not positive and finite.
@@ -55,7 +58,9 @@ def make_task(
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
     """
     require_group(group, "steer")
-    report = (controllability if torques else require_controllable)(group.algebra, controls)
+    report = controllability(group.algebra, controls)
+    if not report.controllable and not torques:
+        _require_drift_helps(group, report, drift)
     if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
         raise SteeringInputError(
             f"steer({group.name}): duration must be a positive number of seconds, got {duration!r}"
@@ -64,3 +69,16 @@ def make_task(
         raise InputError(f"steer({group.name}): tolerance must be positive, got {tolerance!r}")
     element = group_element(group, target, f"steer({group.name}): target")
     return Task(group, element, report.controls, float(duration), float(tolerance), report)
+
+
+def _require_drift_helps(group: MatrixGroup, report: Controllability, drift: Any) -> None:
+    """Refuses controls that reach too little even with the drift; one that is no drift is left to the method to refuse."""
+    try:
+        b = np.asarray(0.0 if drift is None else drift, dtype=float)
+    except (TypeError, ValueError):
+        b = np.zeros(0)
+    usable = b.shape == (group.dim,) and bool(np.all(np.isfinite(b)))
+    if usable and with_drift(group.algebra, report.controls, b) == group.dim:
+        return
+    helped = ", even with the drift" if usable else ""
+    raise UncontrollableError(f"not controllable{helped}: {report.reason}; add a control in a missing direction")

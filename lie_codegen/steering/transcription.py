@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from lie_codegen.simulation.metric import distance
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription_complaint import complaint
+from lie_codegen.steering.transcription_complaint import complaint, ends_in_obstacles
 from lie_codegen.steering.transcription_flow import piecewise_linear
 from lie_codegen.steering.transcription_guess import first_variables, guesses
 from lie_codegen.steering.transcription_numbers import Numbers, Options
@@ -78,7 +79,8 @@ def transcription(
         weights: (m,) positive w_i, ones if not given.
         intervals: N, pieces of the controls.
         starts: first guesses tried; the cheapest admissible result wins.
-        solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere, or the controls are periodic; or either.
+        solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere; ipopt alone where the controls are periodic,
+            or do not reach all without the drift or the inertia. Or "fatrop" or "ipopt".
         progress: called with one line a solve, and within a long one by ipopt every second. What was done is in the plan's
             details["solves"] in any case: start, solver, iterations, objective, violation, seconds and ipopt's residuals.
 
@@ -106,14 +108,20 @@ def _run(
 ) -> Plan:
     started = time.perf_counter()
     structure, numbers = pose(task, asked)
-    names = {"auto": ("ipopt",) if asked.periodic else ("fatrop", "ipopt")}.get(asked.solver, (asked.solver,))
+    if blocked := ends_in_obstacles(task, numbers):
+        raise SteeringError(
+            f"steer({task.group.name}): no admissible manoeuvre; {'; '.join(blocked)}; move one of them"
+        )
+    names = _solvers(task, asked)
     candidates: list[Candidate] = []
     building = 0.0
-    for name in names:
+    for name, shape in ((name, shape) for name in names for shape in (structure, replace(structure, guarded=True))):
+        if shape.guarded and not any(candidate.astray for candidate in candidates):
+            continue
         began = time.perf_counter()
-        built = program(structure, name, listening=progress is not None)
+        built = program(shape, name, listening=progress is not None)
         building += time.perf_counter() - began
-        bench = Workbench(task, structure, numbers, built, progress or (lambda line: None))
+        bench = Workbench(task, shape, numbers, built, progress or (lambda line: None))
         candidates += _candidates(bench, asked.starts)
         if any(candidate.admissible for candidate in candidates):
             break
@@ -123,6 +131,13 @@ def _run(
     best = min(good, key=lambda candidate: candidate.objective)
     seconds = {"build": building, "solve": time.perf_counter() - started - building}
     return _plan(task, structure, numbers, method, tried, candidates, best, seconds)
+
+
+def _solvers(task: Task, asked: Options) -> tuple[str, ...]:
+    """fatrop cannot couple the ends, and has been seen to loop for ever where drift or inertia must help the controls."""
+    if asked.solver != "auto":
+        return (asked.solver,)
+    return ("ipopt",) if asked.periodic or not task.report.controllable else ("fatrop", "ipopt")
 
 
 def _candidates(bench: Workbench, starts: int) -> list[Candidate]:
@@ -149,6 +164,8 @@ def _plan(
     values = best.values / task.duration**numbers.power
     duration = best.duration * task.duration
     group, flight, last = task.group, best.flight, best.solves[-1]
+    if flight is None:
+        raise ValueError("an admissible candidate has flown")
     a, b = values[:-1], values[1:]
     details: dict[str, Any] = {
         "winner": f"transcription from {last.start}",

@@ -22,12 +22,11 @@ def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Se
     """One line: the limits in the way, most important first, and what to try."""
     lines = [f"steer({task.group.name}): no admissible manoeuvre"]
     if candidates:
-        nearest = min(max(each.violation, each.miss) for each in candidates)
+        nearest = min(each.miss if np.isfinite(each.miss) else each.violation for each in candidates)
         lines[0] += (
             f" from {len(candidates)} starts with {structure.intervals} intervals (smallest violation {nearest:.2g}; "
             f"{candidates[0].solves[-1].message})"
         )
-    lines += _ends(task, numbers)
     first = next(iter(guesses(task, structure, numbers, 1)), None)
     if first is not None:
         lines += _needs(task, structure, numbers, first[1])
@@ -39,7 +38,7 @@ def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Se
     return "; ".join([*lines, f"try {advice}"])
 
 
-def _ends(task: Task, numbers: Numbers) -> list[str]:
+def ends_in_obstacles(task: Task, numbers: Numbers) -> list[str]:
     """The ends and the via points that lie inside an obstacle."""
     places = [("start", np.eye(task.group.degree)), ("target", task.target)]
     places += [(f"via point {number}", element) for number, element in enumerate(numbers.via, start=1)]

@@ -38,7 +38,13 @@ class Flight:
 
 
 def fly(
-    group: MatrixGroup, controls: tuple[int, ...], numbers: Numbers, v: Array, duration: float, fine: int = FINE
+    group: MatrixGroup,
+    controls: tuple[int, ...],
+    numbers: Numbers,
+    v: Array,
+    duration: float,
+    fine: int = FINE,
+    tolerance: float = _TOLERANCE,
 ) -> Flight:
     """The motion under v (N + 1, m) at the knots, linear between them, at `fine` times an interval; even."""
     t = np.linspace(0, duration, fine * (len(v) - 1) + 1)
@@ -53,7 +59,7 @@ def fly(
         states = _run(group, velocities, duration, parts)
         nodes = states[::parts]
         off = float(np.max(np.abs(nodes - coarse))) / 15
-        if (off <= _TOLERANCE * max(1.0, float(np.max(np.abs(nodes))))) or parts >= _MOST or not np.isfinite(off):
+        if (off <= tolerance * max(1.0, float(np.max(np.abs(nodes))))) or parts >= _MOST or not np.isfinite(off):
             return Flight(t, states[:: parts // fine], _between(velocities, fine))
         parts, coarse = 2 * parts, nodes
 

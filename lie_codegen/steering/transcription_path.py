@@ -12,9 +12,11 @@ from lie_codegen.steering.transcription_piece import Piece, Symbols, named_funct
 from lie_codegen.steering.transcription_structure import Structure
 from lie_codegen.steering.transcription_tangent import pushed
 
+_WITHIN = 0.5
+
 
 def path(structure: Structure, kind: str) -> Piece:
-    """The conditions at a node: zero, X = goal; then not below zero: clearances, and limits on rates where time is free.
+    """The conditions at a node: zero, X = goal; then not below zero: its half-space, clearances, and limits on rates where time is free.
 
     Args:
         structure: the structure.
@@ -24,6 +26,8 @@ def path(structure: Structure, kind: str) -> Piece:
     rows = []
     if kind in ("via", "last"):
         rows.append(_miss(structure.group, at.goal, at.parts["X"]))
+        if structure.guarded:
+            rows.append(ca.dot(at.goal, at.parts["X"] - at.goal) + _WITHIN)
     if kind in ("inner", "via"):
         rows += _clearances(structure, at)
     if kind != "last" and structure.free_time:

@@ -82,7 +82,8 @@ def program(structure: Structure, solver: str, *, listening: bool = False) -> Pr
         rows = {"via": structure.group.dim, "last": structure.group.dim}.get(kind, 0)
         clear = structure.cones + structure.balls if kind in ("inner", "via") else 0
         limits = 2 * len(structure.controls) if structure.free_time and kind != "last" else 0
-        equality += [True] * rows + [False] * (clear + limits)
+        half_space = 1 if structure.guarded and rows else 0
+        equality += [True] * rows + [False] * (half_space + clear + limits)
     if structure.periodic:
         equality += [True] * len(structure.controls)
     own: dict[str, Any] = {"ipopt": _IPOPT}

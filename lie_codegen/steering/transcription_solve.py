@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ _ROUNDS = 6
 _CLEAR = 1e-8
 _EXACT = 2e-9
 _PUSH = 1.1
+_ASTRAY = 1e-2
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Candidate:
         objective, values, duration: the objective, (N + 1, m) controls and the duration, in the task's units.
         violation: of the constraints by the program's answer, infinite if the end is missed.
         miss: of the target by the true system, or how deep it cuts an obstacle.
-        flight: of the true system.
+        flight: of the true system; None where the program's conditions are not kept.
         solution: all variables.
         solves: the calls of the solver, the last one gave this.
     """
@@ -70,9 +71,14 @@ class Candidate:
     duration: float
     violation: float
     miss: float
-    flight: Flight
+    flight: Flight | None
     solution: Array
     solves: tuple[Solve, ...]
+
+    @property
+    def astray(self) -> bool:
+        """Whether it met the end conditions at another element than the target, as half a turn away."""
+        return self.violation <= FEASIBLE and self.miss > _ASTRAY
 
     @property
     def admissible(self) -> bool:
@@ -110,6 +116,11 @@ def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candid
         solution, solve = _solve(bench, name, margins, aim, start)
         solves.append(solve)
         values, duration = unpacked(bench.structure, solution)
+        if not solve.violation <= FEASIBLE:
+            failed = Candidate(
+                solve.objective, values, duration, solve.violation, np.inf, None, solution, tuple(solves)
+            )
+            return failed if best is None else replace(best, solves=tuple(solves))
         flight = fly(task.group, task.controls, numbers, values, duration)
         cut = np.array([max(0.0, -float(np.min(each.clearance(flight.X)))) for each in numbers.obstacles])
         relative = np.linalg.solve(flight.X[-1], task.target)
@@ -119,14 +130,16 @@ def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candid
         candidate = Candidate(
             solve.objective, values, duration, solve.violation, max(off, deepest), flight, solution, tuple(solves)
         )
-        if best is None or not best.violation <= FEASIBLE or candidate.miss < best.miss:
+        if best is None or candidate.miss < best.miss:
             best = candidate
-        if not candidate.violation <= FEASIBLE or (deepest <= _CLEAR and off <= _EXACT):
+        if (deepest <= _CLEAR and off <= _EXACT) or off > _ASTRAY:
             break
         aim = Aim(aim.X @ relative, aim.xi + slip)
         margins = margins + _PUSH * cut
         start = solution
-    return Candidate(**{**vars(best), "solves": tuple(solves)})
+    if best is None:
+        raise ValueError("no round was made")
+    return replace(best, solves=tuple(solves))
 
 
 def predicted_aim(bench: Workbench, start: Array) -> Aim:

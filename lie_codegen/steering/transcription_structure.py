@@ -24,6 +24,8 @@ class Structure:
         free_time: whether the duration is a variable, and the objective.
         second_order: whether the controls are torques, the state (X, xi).
         periodic: whether the controls end as they begin.
+        guarded: whether the half-space around an element to meet is a condition too: the equations alone also hold half a
+            turn away.
     """
 
     group: MatrixGroup
@@ -35,6 +37,7 @@ class Structure:
     free_time: bool = False
     second_order: bool = False
     periodic: bool = False
+    guarded: bool = False
 
     @cached_property
     def size(self) -> int:

@@ -1,0 +1,45 @@
+"""What controls reach with the help of a drift where their brackets alone do not fill the algebra; numeric.
+
+The system X' = X hat(b + u) is accessible if and only if the brackets of b and the controls fill the algebra, and controllable
+in long enough time on a compact group (Jurdjevic and Sussmann, J. Differential Equations 12 (1972) 313).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.algebra.lie_algebra import LieAlgebra
+
+Array = NDArray[Any]
+
+_RANK = 1e-9
+
+
+def with_drift(algebra: LieAlgebra, controls: Sequence[int], drift: Array) -> int:
+    """Dimension of what the brackets of the controls and the drift fill."""
+    start = np.vstack([np.eye(algebra.dim)[list(controls)], drift])
+    return len(_closure(start, _bracket(algebra)))
+
+
+def _bracket(algebra: LieAlgebra) -> Callable[[Array, Array], Array]:
+    c = algebra.structure_constants
+    return lambda x, y: np.asarray(np.einsum("i,j,ijk->k", x, y, c))
+
+
+def _closure(start: Array, product: Callable[[Array, Array], Array]) -> Array:
+    """Orthonormal rows that span what products of the rows, of products ..., fill."""
+    rows = _independent(start)
+    while True:
+        more = _independent(np.vstack([rows, *(product(x, y) for x in rows for y in rows)]))
+        if len(more) == len(rows):
+            return rows
+        rows = more
+
+
+def _independent(rows: Array) -> Array:
+    _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(directions[sizes > _RANK * max(1.0, sizes[0])])
