@@ -120,6 +120,18 @@ def test_an_extremal_past_its_conjugate_point_is_told() -> None:
     assert solver.extremal([1.0, 0.2, 6.0]).conjugate_times() == ()
 
 
+def test_short_manoeuvres_are_not_taken_for_conjugate_points() -> None:
+    """Their Jacobian is singular to rounding, as it must be: weight-5 directions have moved by r^5."""
+    su3 = gell_mann()
+    short = shooter(su3, (0, 1)).extremal([0.2, -0.2, 0.1, 0.3, -0.1, 0.2, 0.1, -0.3])
+    assert short.singular_values()[-1] < 1e-12
+    assert short.conjugate_times() == ()
+    so3 = lc.group("so3")
+    plan = lc.steer(so3, expm(so3.hat([1e-3, 2e-3, 1e-6])), ("w1", "w2"), 1.0)
+    assert not plan.details["conjugate_target"]
+    assert "strict local minimum" in plan.details["optimality"]
+
+
 def test_weights_make_a_control_dearer() -> None:
     group = lc.group("so3")
     target = random_targets(group, 1, seed=8, size=0.8)[0]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.codegen.steering_lengths import bracket_lengths
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 Array = NDArray[Any]
@@ -20,6 +21,8 @@ Array = NDArray[Any]
 _ORDER = 12
 _STEPS = 256
 _SKIPPED = 16
+_RESOLVED = 1e-8
+_NOISE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -99,11 +102,35 @@ class Extremal:
             xi.append(state[n:])
         return np.array(xi)
 
+    @cached_property
+    def _scaled(self) -> tuple[Array, Array, Array]:
+        """xi measured by bracket lengths at t = 1/256, ...: directions of l brackets have moved like r^l, r the length so far.
+
+        With its singular values, (256, n), and what rounding may make of the least of them, relative to the largest.
+        """
+        lengths = np.array(bracket_lengths(self.group, self.controls))
+        speed = float(np.linalg.norm(self.mu0[list(self.controls)] / self.weights))
+        r = np.minimum(1.0, max(speed, 1e-12) * np.arange(1, _STEPS + 1) / _STEPS)
+        scaled = self.sensitivities * r[:, None, None] ** (2.0 - lengths[:, None] - lengths)
+        noise = np.maximum(_RESOLVED, _NOISE * r ** (2.0 - 2 * lengths.max()))
+        return scaled, np.linalg.svd(scaled, compute_uv=False), noise
+
     def conjugate_times(self) -> tuple[float, ...]:
-        """Times in (0, 1) at which det xi changes sign: past the first one the extremal is no local minimum."""
-        sign = np.linalg.slogdet(self.sensitivities)[0]
-        changes = np.flatnonzero(sign[_SKIPPED + 1 : -1] != sign[_SKIPPED:-2]) + _SKIPPED + 1
-        return tuple(float((place + 0.5) / _STEPS) for place in changes)
+        """Times in (0, 1) at which det xi changes sign: past the first one the extremal is no local minimum.
+
+        Times at which rounding alone could change the sign do not count.
+        """
+        scaled, sizes, noise = self._scaled
+        known = np.flatnonzero(sizes[:, -1] > noise * sizes[:, 0])
+        known = known[(known >= _SKIPPED) & (known < _STEPS - 1)]
+        sign = np.linalg.slogdet(scaled[known])[0]
+        changes = np.flatnonzero(sign[1:] != sign[:-1])
+        return tuple(float((known[k] + known[k + 1] + 2) / (2 * _STEPS)) for k in changes)
+
+    def conjugacy(self) -> float:
+        """The least singular value of xi at the end over the largest, measured by bracket lengths: 0 at a conjugate point."""
+        sizes = self._scaled[1][-1]
+        return float(sizes[-1] / sizes[0])
 
     def singular_values(self) -> Array:
         """(n,) of vee(X^-1 dX(1) / d mu0), largest first; the last is 0 where the target is a conjugate point."""

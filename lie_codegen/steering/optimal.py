@@ -85,7 +85,7 @@ def _plan(
     singular = extremal.singular_values()
     conjugate = extremal.conjugate_times()
     seconds["examine"] = time.perf_counter() - started
-    ratio = float(singular[-1] / singular[0])
+    ratio = extremal.conjugacy()
     details = {
         "winner": "shooting on the Lie-Poisson equations" + ("" if solver.compiled else ", in numpy (no C compiler)"),
         "tried": tried,

@@ -1,4 +1,8 @@
-"""The shooting solver in numpy, where there is no C compiler: the algorithm of the generated C, all starts at once."""
+"""The shooting solver in numpy, where there is no C compiler: all starts at once, plainer than the generated C.
+
+The same first guesses, Levenberg-Marquardt and polishing; guesses are not relaxed, errors not measured by bracket lengths,
+and what is not solved is not searched again, so that deep brackets and very small targets need the compiler.
+"""
 
 from __future__ import annotations
 
