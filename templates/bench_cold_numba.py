@@ -8,6 +8,7 @@ import numpy as np
 
 @numba.njit
 def exp(x, X):
+    """X = exp(hat(x)), x = (w, v)."""
     p, q, r = x[0], x[1], x[2]
     s = p * p + q * q + r * r
     if s < 1e-4:
