@@ -32,7 +32,9 @@ def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
         logarithm = small @ (np.eye(group.degree) - small @ (np.eye(group.degree) / 2 - small / 3))
         x = group.project(logarithm)
         return x, float(np.max(np.abs(group.hat(x) - logarithm)))
-    quick = _diagonal_log(group, matrix)
+    quick = _unipotent_log(group, small)
+    if quick is None:
+        quick = _diagonal_log(group, matrix)
     if quick is not None:
         return quick, 0.0
     logarithm = np.asarray(scipy.linalg.logm(matrix))
@@ -40,6 +42,19 @@ def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
         return np.zeros(group.dim), float("inf")
     x = group.project(logarithm)
     return x, float(np.max(np.abs(scipy.linalg.expm(group.hat(x)) - matrix)))
+
+
+def _unipotent_log(group: MatrixGroup, nilpotent: Array) -> Array | None:
+    """The logarithm of I + N by its series, where N^d = 0 and the result is in the algebra."""
+    power, total = nilpotent, nilpotent
+    for k in range(2, group.degree + 1):
+        power = -power @ nilpotent
+        total = total + power / k
+    scale = max(1.0, float(np.max(np.abs(nilpotent))))
+    if not np.max(np.abs(power)) <= 1e-16 * scale:
+        return None
+    x = group.project(total)
+    return x if np.max(np.abs(group.hat(x) - total)) <= _IN_ALGEBRA * scale else None
 
 
 def _diagonal_log(group: MatrixGroup, matrix: Array) -> Array | None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.algebra.controllability import Controllability, controllability
+from lie_codegen.algebra.controllability import Controllability, control_indices, controllability
+from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.simulation.metric import group_element
@@ -58,7 +60,7 @@ def make_task(
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
     """
     require_group(group, "steer")
-    report = controllability(group.algebra, controls)
+    report = _reach(group.algebra, control_indices(group.algebra, controls))
     if not report.controllable and not torques:
         _require_drift_helps(group, report, drift)
     if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
@@ -69,6 +71,11 @@ def make_task(
         raise InputError(f"steer({group.name}): tolerance must be positive, got {tolerance!r}")
     element = group_element(group, target, f"steer({group.name}): target")
     return Task(group, element, report.controls, float(duration), float(tolerance), report)
+
+
+@lru_cache(maxsize=64)
+def _reach(algebra: LieAlgebra, controls: tuple[int, ...]) -> Controllability:
+    return controllability(algebra, controls)
 
 
 def _require_drift_helps(group: MatrixGroup, report: Controllability, drift: Any) -> None:
