@@ -60,6 +60,16 @@ def test_the_example_compiles_by_itself_and_is_content(
         assert energy == pytest.approx(0.80350066222184167 / 24, rel=1e-10)
 
 
+@pytest.mark.skipif(shutil.which("clang") is None, reason="no clang")
+def test_clang_agrees(tmp_path: Path) -> None:
+    """Without the flags of this machine: vectors wider than its registers may not be passed by value."""
+    write(render_steering_package(lc.group("so3"), ("w1", "w2")), tmp_path)
+    command = ["clang", *STRICT, "-Iinclude", "example.c", "src/so3_steer.c", "-lm", "-o", "example"]
+    done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert subprocess.run([tmp_path / "example"], check=False, capture_output=True).returncode == 0
+
+
 def test_nothing_is_allocated_and_nothing_is_global() -> None:
     source = render_steering_package(lc.group("so3"), ("w1", "w2"))["src/so3_steer.c"]
     assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\b", source)
