@@ -25,6 +25,8 @@ ALLOWED = {
     "jinja2": {"codegen"},
     "scipy": {"control", "simulation", "steering", "studies", "gallery"},
     "dask": {"studies"},
+    "rockit": {"studies"},
+    "crocoddyl": {"studies"},
     "mpmath": {"studies"},
     "matplotlib": {"gallery", "plots"},
     "typer": {"cli"},
