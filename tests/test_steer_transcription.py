@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import SteeringError, SteeringInputError, UncontrollableError
-from lie_codegen.steering import transcription_problem
+from lie_codegen.steering import transcription_problem, watched_solver
 from lie_codegen.steering.accessibility import with_drift
 from lie_codegen.steering.constraints import Ball
 from lie_codegen.steering.packing import pack_element
@@ -79,6 +79,17 @@ def test_the_compiled_program_is_the_symbolic_one(monkeypatch: pytest.MonkeyPatc
     slow = lc.steer(group, target, (0, 1), 1.0, **options)
     transcription_problem.program.cache_clear()
     assert slow.cost == pytest.approx(quick.cost, rel=1e-6)
+
+
+def test_a_solver_that_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """fatrop can loop for ever; ipopt then takes over, and the next problem finds a new process."""
+    group, options = lc.group("so3"), {"intervals": 16, "starts": 1, "bounds": 20.0}
+    with monkeypatch.context() as patch:
+        patch.setattr(watched_solver, "_PATIENCE", -1e3)
+        plan = lc.steer(group, G, (0, 1), 1.0, **options)
+    assert "ended after" in plan.details["solves"][0].message
+    assert plan.details["solver"] == "ipopt"
+    assert lc.steer(group, G, (0, 1), 1.0, **options).details["solver"] == "fatrop"
 
 
 def test_every_solve_is_on_record_and_told_when_asked() -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.steering.extremal import Extremal
 from lie_codegen.steering.extremals import SOLVED, Extremals
 from lie_codegen.steering.finish import finish
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.plan import Controls, Plan, PlanOnDemand, Status
 from lie_codegen.steering.shooting import Shooter, shooter
 from lie_codegen.steering.task import Task
 
@@ -80,12 +81,41 @@ def optimal(
 def _plan(
     task: Task, solver: Shooter, found: Extremals, weights: Array, tried: tuple[str, ...], seconds: dict[str, float]
 ) -> Plan:
+    """The plan; the energy of an extremal is constant in time, so that with equal weights its cost is known."""
+    extremal = cache(lambda: solver.extremal(found.mu0[0], weights=weights))
+    u = extremal_controls(task, extremal)
+    known = {"cost": float(found.cost[0]) / task.duration} if np.all(weights == 1) else {}
+
+    def examine() -> Plan:
+        return _examined(task, solver, found, weights, tried, seconds, extremal(), u)
+
+    return PlanOnDemand(
+        examine,
+        group=task.group,
+        target=task.target,
+        controls=tuple(task.group.labels[i] for i in task.controls),
+        duration=task.duration,
+        method="optimal",
+        u=u,
+        **known,
+    )
+
+
+def _examined(
+    task: Task,
+    solver: Shooter,
+    found: Extremals,
+    weights: Array,
+    tried: tuple[str, ...],
+    seconds: dict[str, float],
+    extremal: Extremal,
+    u: Controls,
+) -> Plan:
     started = time.perf_counter()
-    extremal = solver.extremal(found.mu0[0], weights=weights)
     singular = extremal.singular_values()
     conjugate = extremal.conjugate_times()
-    seconds["examine"] = time.perf_counter() - started
     ratio = extremal.conjugacy()
+    taken = {**seconds, "examine": time.perf_counter() - started}
     details = {
         "winner": "shooting on the Lie-Poisson equations" + ("" if solver.compiled else ", in numpy (no C compiler)"),
         "tried": tried,
@@ -104,15 +134,7 @@ def _plan(
         "discretisation": "none: the extremal is exact to rounding",
         "extremal": extremal,
     }
-    return finish(
-        task,
-        "optimal",
-        extremal_controls(task, extremal),
-        details,
-        seconds,
-        solved=Status.LOCAL,
-        otherwise=Status.NOT_CONVERGED,
-    )
+    return finish(task, "optimal", u, details, taken, solved=Status.LOCAL, otherwise=Status.NOT_CONVERGED)
 
 
 def _optimality(starts: int, agreeing: int, ratio: float, conjugate: tuple[float, ...]) -> str:
@@ -132,12 +154,12 @@ def _optimality(starts: int, agreeing: int, ratio: float, conjugate: tuple[float
     )
 
 
-def extremal_controls(task: Task, extremal: Extremal) -> Controls:
+def extremal_controls(task: Task, extremal: Callable[[], Extremal]) -> Controls:
     """The controls of an extremal, slowed down to the task's duration."""
 
     def evaluate(t: Array) -> Array:
         u = np.zeros((len(t), task.group.dim))
-        u[:, list(task.controls)] = extremal.control(np.clip(t / task.duration, 0, 1)) / task.duration
+        u[:, list(task.controls)] = extremal().control(np.clip(t / task.duration, 0, 1)) / task.duration
         return u
 
     return Controls(evaluate, ())

@@ -81,3 +81,33 @@ class Plan:
     status: Status
     seconds: Mapping[str, float]
     details: Mapping[str, Any]
+
+
+class PlanOnDemand(Plan):
+    """A plan whose end is simulated, and whose extremal is examined, when one of the results is first read.
+
+    Both take a hundred times as long as the solution itself, and who steers in a loop reads the controls alone.
+    """
+
+    def __init__(self, examine: Callable[[], Plan], **known: Any) -> None:
+        """`known`: the fields that are at hand; `examine` gives the whole plan."""
+        for name, value in {**known, "_examine": examine}.items():
+            object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Only asked for fields that are not yet known."""
+        if name not in Plan.__dataclass_fields__:
+            raise AttributeError(f"a Plan has no attribute {name!r}")
+        whole = self._examine()
+        for each in Plan.__dataclass_fields__:
+            object.__setattr__(self, each, getattr(whole, each))
+        return getattr(whole, name)
+
+    def __repr__(self) -> str:
+        return repr(Plan(*self._values()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Plan, self._values()
+
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, name) for name in Plan.__dataclass_fields__)

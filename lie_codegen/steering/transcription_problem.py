@@ -24,6 +24,7 @@ from lie_codegen.steering.transcription_path import path
 from lie_codegen.steering.transcription_source import compiled
 from lie_codegen.steering.transcription_stage import interval
 from lie_codegen.steering.transcription_structure import KINDS, Structure
+from lie_codegen.steering.watched_solver import WatchedSolver
 
 Array = NDArray[Any]
 
@@ -52,7 +53,7 @@ class Program:
     """A solver.
 
     Attributes:
-        solver: the casadi function.
+        solver: the casadi function, or a `WatchedSolver`, which is called like one.
         name: "fatrop" or "ipopt".
         lower, upper: (rows,) limits of the constraints: zeros, and zeros or infinity.
         gap_rows: (N,) the row at which each interval's gap begins.
@@ -95,9 +96,13 @@ def program(structure: Structure, solver: str, *, listening: bool = False) -> Pr
     if listener is not None:
         own["iteration_callback"] = listener
     library = None if structure.periodic else compiled(structure, solver)
-    oracle: Any = _symbolic(structure) if library is None else str(library)
+    if library is not None and solver == "fatrop":
+        made: Any = WatchedSolver(solver, str(library), {**_COMMON, **own})
+    else:
+        oracle: Any = _symbolic(structure) if library is None else str(library)
+        made = ca.nlpsol("steer", solver, oracle, {**_COMMON, **own})
     return Program(
-        ca.nlpsol("steer", solver, oracle, {**_COMMON, **own}),
+        made,
         solver,
         np.zeros(len(equality)),
         np.where(equality, 0.0, np.inf),
