@@ -130,6 +130,48 @@ static inline PyObject *new_array(const Port *port, int ndim, npy_intp *dims)
     return PyArray_NewFromDescr(&PyArray_Type, port->descr, ndim, dims, NULL, NULL, 0, NULL);
 }
 
+/* Whether two ranges of memory share a byte. */
+static int overlap(const void *a, npy_intp a_size, const void *b, npy_intp b_size)
+{
+    const uintptr_t x = (uintptr_t)a, y = (uintptr_t)b;
+    return x < y + (uintptr_t)b_size && y < x + (uintptr_t)a_size;
+}
+
+/* The arrays of out=, one or a tuple of them, if they are what the ports take, and apart. */
+static int given(const Function *self, PyObject *out, int lead, npy_intp count, PyObject **outputs, double **to)
+{
+    int i, k;
+    if (self->n_out > 1 && (!PyTuple_Check(out) || PyTuple_GET_SIZE(out) != self->n_out)) {
+        return 0;
+    }
+    for (i = 0; i < self->n_out; ++i) {
+        PyObject *one = self->n_out > 1 ? PyTuple_GET_ITEM(out, i) : out;
+        PyArrayObject *array = (PyArrayObject *)one;
+        if (!PyArray_CheckExact(one) || !fits(&self->ports[self->n_in + i], array, lead, NPY_ARRAY_CARRAY)
+            || (lead && PyArray_DIM(array, 0) != count)) {
+            return 0;
+        }
+        outputs[i] = one;
+        to[i] = PyArray_DATA(array);
+        for (k = 0; k < i; ++k) {
+            if (overlap(to[k], PyArray_NBYTES((PyArrayObject *)outputs[k]), to[i], PyArray_NBYTES(array))) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+/* Arrays of the caller as the result. */
+static PyObject *kept(const Function *self, PyObject **outputs)
+{
+    int i;
+    for (i = 0; i < self->n_out; ++i) {
+        Py_INCREF(outputs[i]);
+    }
+    return self->result == NULL ? outputs[0] : several(self, outputs);
+}
+
 static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t nargsf, PyObject *kwnames)
 {
     Function *self = (Function *)callable;
@@ -159,14 +201,11 @@ static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t narg
         }
     }
     if (out != NULL) {
-        if (self->n_out != 1 || !PyArray_CheckExact(out)
-            || !fits(&self->ports[self->n_in], (PyArrayObject *)out, 0, NPY_ARRAY_CARRAY)) {
+        if (!given(self, out, 0, 0, outputs, to)) {
             goto slowly;
         }
-        to[0] = PyArray_DATA((PyArrayObject *)out);
         self->call(in, to);
-        Py_INCREF(out);
-        return out;
+        return kept(self, outputs);
     }
     for (i = 0; i < self->n_out; ++i) {
         Port *port = &self->ports[self->n_in + i];
@@ -203,13 +242,6 @@ failed:
     return NULL;
 slowly:
     return PyObject_Vectorcall(self->slow, args, (size_t)nargs, kwnames);
-}
-
-/* Whether two ranges of memory share a byte. */
-static int overlap(const void *a, npy_intp a_size, const void *b, npy_intp b_size)
-{
-    const uintptr_t x = (uintptr_t)a, y = (uintptr_t)b;
-    return x < y + (uintptr_t)b_size && y < x + (uintptr_t)a_size;
 }
 
 static PyObject *call_batch(PyObject *callable, PyObject *const *args, size_t nargsf, PyObject *kwnames)
@@ -252,20 +284,21 @@ static PyObject *call_batch(PyObject *callable, PyObject *const *args, size_t na
         goto slowly;
     }
     if (out != NULL) {
-        PyArrayObject *array = (PyArrayObject *)out;
-        if (self->n_out != 1 || !PyArray_CheckExact(out) || !fits(&self->ports[self->n_in], array, 1, NPY_ARRAY_CARRAY)
-            || PyArray_DIM(array, 0) != count) {
+        if (!given(self, out, 1, count, outputs, to)) {
             goto slowly;
         }
         for (i = 0; i < self->n_in; ++i) {
-            const npy_intp doubles = strides[i] == 0 ? self->ports[i].size : count * self->ports[i].size;
-            if (overlap(in[i], doubles * (npy_intp)sizeof(double), PyArray_DATA(array), PyArray_NBYTES(array))) {
-                goto slowly;
+            const npy_intp bytes = (strides[i] == 0 ? 1 : count) * self->ports[i].size * (npy_intp)sizeof(double);
+            int k;
+            for (k = 0; k < self->n_out; ++k) {
+                if (overlap(in[i], bytes, to[k], PyArray_NBYTES((PyArrayObject *)outputs[k]))) {
+                    goto slowly;
+                }
             }
         }
-        to[0] = PyArray_DATA(array);
-        Py_INCREF(out);
-        outputs[0] = out;
+        for (i = 0; i < self->n_out; ++i) {
+            Py_INCREF(outputs[i]);
+        }
     } else {
         for (i = 0; i < self->n_out; ++i) {
             const Port *port = &self->ports[self->n_in + i];

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import toy_kernels
 
+from lie_codegen.errors import ShapeError
 from lie_codegen.runtime import extension
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.call import Compiled
@@ -113,6 +114,29 @@ def test_a_batch_that_writes_over_its_input_is_right(libs: tuple[Library, Librar
     expected = libs[0].rate.batch(store[:-1].copy(), u)
     libs[0].rate.batch(store[:-1], u, out=store[1:])
     np.testing.assert_array_equal(store[1:], expected)
+
+
+def test_several_outputs_into_the_callers_arrays(libs: tuple[Library, Library]) -> None:
+    x = np.random.default_rng(5).uniform(-1, 1, (40, 2))
+    for lib in libs:
+        for function, start in ((lib.step, x[0].copy()), (lib.step.batch, x.copy())):
+            expected = function(start, 0.5, 0.1)
+            out = tuple(np.full(np.shape(each), np.nan) for each in expected)
+            counts = [sys.getrefcount(each) for each in out]
+            for _ in range(100):
+                got = function(start, 0.5, 0.1, out=out)
+            assert type(got) is type(expected)
+            for mine, given, right in zip(got, out, expected, strict=True):
+                assert mine is given
+                np.testing.assert_array_equal(given, right)
+            del got, mine, given
+            assert [sys.getrefcount(each) for each in out] == counts
+            for bad in (out[:-1], (out[0],) * len(out), (*out[:-1], np.zeros(7))):
+                with pytest.raises(ShapeError):
+                    function(start, 0.5, 0.1, out=bad)
+        store = x.copy()
+        lib.step.batch(store, 0.5, 0.1, out=(store, *out[1:]))  # the last `out` is a batch's
+        np.testing.assert_array_equal(store, expected[0])
 
 
 def test_libraries_are_collected() -> None:
