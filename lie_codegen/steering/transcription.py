@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import ComputationError, SteeringError
+from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.simulation.metric import distance
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan, Status
@@ -134,10 +135,13 @@ def _run(
 
 
 def _solvers(task: Task, asked: Options) -> tuple[str, ...]:
-    """fatrop cannot couple the ends, and has been seen to loop for ever where drift or inertia must help the controls."""
+    """fatrop cannot couple the ends, loops for ever where drift or inertia must help the controls, and can be ended only where
+    it solves a compiled program."""
     if asked.solver != "auto":
         return (asked.solver,)
-    return ("ipopt",) if asked.periodic or not task.report.controllable else ("fatrop", "ipopt")
+    if asked.periodic or not task.report.controllable or not find_compilers():
+        return ("ipopt",)
+    return ("fatrop", "ipopt")
 
 
 def _candidates(bench: Workbench, starts: int) -> list[Candidate]:
