@@ -9,6 +9,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.front import build
 from lie_codegen.runtime.library import Library
 
 if TYPE_CHECKING:
@@ -27,6 +28,12 @@ def integrators(group: MatrixGroup) -> Library:
         return [rkmk4_step(group), wei_norman_step(group), *named]
 
     return build_kernels(kernels, namespace=group.name, definition=f"integrators\n{group.definition}")
+
+
+@lru_cache(maxsize=32)
+def logarithms(group: MatrixGroup) -> Library:
+    """exp and log of the group, compiled when first called."""
+    return build(group)
 
 
 #: The methods of `lc.simulate`.

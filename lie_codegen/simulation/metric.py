@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.simulation.chart import mismatch, newton
-from lie_codegen.simulation.libraries import integrators
+from lie_codegen.simulation.libraries import integrators, logarithms
 
 Array = NDArray[Any]
 
@@ -22,6 +22,8 @@ _BEFORE_CUT = 3.1
 _MOST_PARALLEL = 1e2
 _IN_ALGEBRA = 1e-13
 _SEED = 20
+#: Dimensions up to which exp and log are derived and compiled in a fraction of a second.
+_SMALL = 6
 
 
 def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
@@ -32,11 +34,10 @@ def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
         logarithm = small @ (np.eye(group.degree) - small @ (np.eye(group.degree) / 2 - small / 3))
         x = group.project(logarithm)
         return x, float(np.max(np.abs(group.hat(x) - logarithm)))
-    quick = _unipotent_log(group, small)
-    if quick is None:
-        quick = _diagonal_log(group, matrix)
-    if quick is not None:
-        return quick, 0.0
+    for quickly in (_compiled_log, _unipotent_log, _diagonal_log):
+        found = quickly(group, matrix)
+        if found is not None:
+            return found, 0.0
     logarithm = np.asarray(scipy.linalg.logm(matrix))
     if not np.all(np.isfinite(logarithm)):
         return np.zeros(group.dim), float("inf")
@@ -44,8 +45,22 @@ def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
     return x, float(np.max(np.abs(scipy.linalg.expm(group.hat(x)) - matrix)))
 
 
-def _unipotent_log(group: MatrixGroup, nilpotent: Array) -> Array | None:
+def _compiled_log(group: MatrixGroup, matrix: Array) -> Array | None:
+    """By the group's own kernels, of a group small enough to have them at once, where exp of the result is the matrix."""
+    if group.dim > _SMALL:
+        return None
+    maps = logarithms(group)
+    with np.errstate(all="ignore"):
+        x = np.asarray(maps.log(np.ascontiguousarray(matrix, dtype=group.basis.dtype)))
+        if not np.all(np.isfinite(x)):
+            return None
+        off = np.max(np.abs(maps.exp(x) - matrix))
+    return x if off <= _IN_ALGEBRA * max(1.0, float(np.max(np.abs(matrix)))) else None
+
+
+def _unipotent_log(group: MatrixGroup, matrix: Array) -> Array | None:
     """The logarithm of I + N by its series, where N^d = 0 and the result is in the algebra."""
+    nilpotent = matrix - np.eye(group.degree)
     power, total = nilpotent, nilpotent
     for k in range(2, group.degree + 1):
         power = -power @ nilpotent
