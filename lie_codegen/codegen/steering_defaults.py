@@ -32,7 +32,7 @@ class Defaults:
         if dim <= 3 and depth <= 1:
             return Defaults(16, 16, 16)
         if depth <= 1:
-            return Defaults(64, 16, 16)
+            return Defaults(32, 16, 16)
         if depth == 2:
             return Defaults(128, 24, 40, polish_iterations=100)
         return Defaults(512, 32, 40, polish_iterations=100)
