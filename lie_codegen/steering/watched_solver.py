@@ -103,6 +103,8 @@ class _Worker:
     def _started(self) -> _Running:
         running = self._running
         if running is None or running.process.poll() is not None:
+            if not sys.executable or getattr(sys, "frozen", False):
+                raise OSError("no Python to start")
             command = [sys.executable, "-m", "lie_codegen.steering.watched_solver"]
             paths = os.pathsep.join(path for path in sys.path if path)
             process = subprocess.Popen(
