@@ -6,6 +6,7 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,3 +27,19 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def repository() -> Path:
     return Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def compiles(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The main files of the runs of the compiler."""
+    from lie_codegen.runtime import ladder  # not before the threads of BLAS are set
+
+    runs: list[str] = []
+    real = ladder.compile_library
+
+    def counted(*args: Any) -> None:
+        runs.append(args[2])
+        real(*args)
+
+    monkeypatch.setattr(ladder, "compile_library", counted)
+    return runs

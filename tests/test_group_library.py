@@ -47,20 +47,6 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def compiles(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The main files of the runs of the compiler."""
-    runs: list[str] = []
-    real = ladder.compile_library
-
-    def counted(*args: Any) -> None:
-        runs.append(args[2])
-        real(*args)
-
-    monkeypatch.setattr(ladder, "compile_library", counted)
-    return runs
-
-
-@pytest.fixture
 def current() -> None:
     """Skip where the store is out of date: one test says so, and what to do."""
     if index()["sha256"] != prebuilt.source_digest(index()["files"]):

@@ -22,7 +22,7 @@ import toy_kernels
 
 from lie_codegen.errors import CacheError, CacheWarning, CodegenError, CompileError, NoCompilerWarning
 from lie_codegen.kernels.kernel import Kernel, Port
-from lie_codegen.runtime import build, cache, cache_folder, compiler, ladder, opened
+from lie_codegen.runtime import build, cache, cache_folder, compiler, opened
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
@@ -43,20 +43,6 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for memo in (cache_folder._warn_once, compiler.warn_no_compiler):
         memo.cache_clear()
     return folder
-
-
-@pytest.fixture
-def compiles(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The runs of the compiler."""
-    runs: list[str] = []
-    real = ladder.compile_library
-
-    def counted(*args: Any) -> None:
-        runs.append(args[2])
-        real(*args)
-
-    monkeypatch.setattr(ladder, "compile_library", counted)
-    return runs
 
 
 def load_copy(path: Path) -> Any:

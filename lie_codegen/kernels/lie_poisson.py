@@ -20,6 +20,7 @@ from lie_codegen.kernels.block_solve import add
 from lie_codegen.kernels.element_pattern import pack, packed_size, unpack
 from lie_codegen.kernels.kernel import Kernel, Port
 from lie_codegen.kernels.lie_poisson_ends import advance, correction, endpoint, offset, sparse_product
+from lie_codegen.kernels.linear import plus
 from lie_codegen.kernels.rkmk import bracket_body, hat_body, sum_products
 
 
@@ -103,7 +104,7 @@ def leap(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
 
     def body(ops: Arithmetic, v: Any, mu_before: Any, X_before: Any, mu: Any, X: Any) -> tuple[Any, ...]:
         mu_rate, X_rate = _rates(group, controls, ops, v, mu, X)
-        return _sum(mu_before, mu_rate), _sum(X_before, X_rate)
+        return plus(mu_before, mu_rate), plus(X_before, X_rate)
 
     return Kernel(
         "leap",
@@ -157,7 +158,7 @@ def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
         def rate(state: Sequence[Scalar], half: int) -> list[Scalar]:
             (u, mu), psi, xi = nodes[half], state[:n], state[n:]
             du = _velocity(controls, v, psi)
-            psi_rate = _sum(_coadjoint(group, controls, ops, du, mu), _coadjoint(group, controls, ops, u, psi))
+            psi_rate = plus(_coadjoint(group, controls, ops, du, mu), _coadjoint(group, controls, ops, u, psi))
             xi_rate = bracket_body(group, ops, xi, _spread(group, controls, u))
             for value, position in zip(du, controls, strict=True):
                 xi_rate[position] = add(value, xi_rate[position])
@@ -190,7 +191,7 @@ def _stages(
     k1 = rate(y, 0)
     k2 = rate([a + half * k for a, k in zip(y, k1, strict=True)], 1)
     k3 = rate([a + half * k for a, k in zip(y, k2, strict=True)], 1)
-    return k1, k2, k3, rate(_sum(y, k3), 2)
+    return k1, k2, k3, rate(plus(y, k3), 2)
 
 
 def _after(ops: Arithmetic, y: Sequence[Scalar], stages: tuple[list[Scalar], ...]) -> list[Scalar]:
@@ -211,10 +212,6 @@ def _rates(
 
 def _velocity(controls: tuple[int, ...], v: Sequence[Scalar], mu: Sequence[Scalar]) -> list[Scalar]:
     return [factor * mu[position] for factor, position in zip(v, controls, strict=True)]
-
-
-def _sum(x: Sequence[Scalar], y: Sequence[Scalar]) -> list[Scalar]:
-    return [add(a, b) for a, b in zip(x, y, strict=True)]
 
 
 def _coadjoint(

@@ -7,6 +7,7 @@ from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernels.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernels.block_solve import is_zero
 from lie_codegen.kernels.complex_scalar import Complex
 from lie_codegen.kernels.element_pattern import pack, packed_size, unpack
 from lie_codegen.kernels.kernel import Kernel, Port
@@ -112,13 +113,9 @@ def sparse_product(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
     """a b; the plain zeros of b are left out."""
     size = len(a)
     return [
-        [sum_products((a[i][m], b[m][j]) for m in range(size) if not _plain_zero(b[m][j])) for j in range(size)]
+        [sum_products((a[i][m], b[m][j]) for m in range(size) if not is_zero(b[m][j])) for j in range(size)]
         for i in range(size)
     ]
-
-
-def _plain_zero(value: Any) -> bool:
-    return isinstance(value, int) and value == 0
 
 
 def _minus(value: Any, number: int) -> Any:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 
 Array = NDArray[Any]
+Product = Callable[[Array, Array], Array]
 
 _RANK = 1e-9
 
@@ -22,24 +23,26 @@ _RANK = 1e-9
 def with_drift(algebra: LieAlgebra, controls: Sequence[int], drift: Array) -> int:
     """Dimension of what the brackets of the controls and the drift fill."""
     start = np.vstack([np.eye(algebra.dim)[list(controls)], drift])
-    return len(_closure(start, _bracket(algebra)))
+    return len(closure(independent(start), bracket_of(algebra), independent))
 
 
-def _bracket(algebra: LieAlgebra) -> Callable[[Array, Array], Array]:
+def bracket_of(algebra: LieAlgebra) -> Product:
+    """[x, y] of coordinates."""
     c = algebra.structure_constants
     return lambda x, y: np.asarray(np.einsum("i,j,ijk->k", x, y, c))
 
 
-def _closure(start: Array, product: Callable[[Array, Array], Array]) -> Array:
-    """Orthonormal rows that span what products of the rows, of products ..., fill."""
-    rows = _independent(start)
-    while True:
-        more = _independent(np.vstack([rows, *(product(x, y) for x in rows for y in rows)]))
+def closure(rows: Array, product: Product, span: Callable[[Array], Array]) -> Array:
+    """Orthonormal rows that span what products of the rows, of products ..., fill; `span` makes rows orthonormal."""
+    while len(rows) < rows.shape[1]:
+        more = span(np.vstack([rows, *(product(x, y) for x in rows for y in rows)]))
         if len(more) == len(rows):
-            return rows
+            break
         rows = more
+    return rows
 
 
-def _independent(rows: Array) -> Array:
+def independent(rows: Array) -> Array:
+    """Orthonormal rows of the same span."""
     _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
     return np.asarray(directions[sizes > _RANK * max(1.0, sizes[0])])

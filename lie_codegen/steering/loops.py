@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.simulation.metric import matrix_log
@@ -75,7 +75,7 @@ def _retuned(task: Task, chain: Chain) -> Chain:
     best = found if off < _EXACT else None
     x, miss = matrix_log(group, task.target)
     for rounds in _ROUNDS if miss < _ON_GROUP else ():
-        root = _exponential(group.hat(x / rounds))
+        root = expm(group.hat(x / rounds))
         found, off = Chain.towards(group, task.controls, x / rounds).repeated(rounds).retuned(root)
         hit = found if off < _EXACT / rounds else None
         if best is not None:
@@ -87,12 +87,6 @@ def _retuned(task: Task, chain: Chain) -> Chain:
         f"steer({group.name}): the chain of loops cannot be retuned to the target (misses by {off:.2g}); use method='optimal', "
         "or exact=False with method='feedback'"
     )
-
-
-def _exponential(A: Array) -> Array:
-    from scipy.linalg import expm
-
-    return np.asarray(expm(A))
 
 
 def _named(eight: FigureEight, labels: list[str]) -> str:

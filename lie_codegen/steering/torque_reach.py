@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.errors import UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.accessibility import bracket_of, closure
 
 Array = NDArray[Any]
 
@@ -47,23 +48,12 @@ def torque_growth(group: MatrixGroup, controls: tuple[int, ...], inertia: Array)
         force = np.einsum("i,ijk,k->j", x, c, inertia @ y) + np.einsum("i,ijk,k->j", y, c, inertia @ x)
         return np.asarray(-inverse @ force)
 
-    def bracket(x: Array, y: Array) -> Array:
-        return np.asarray(np.einsum("i,j,ijk->k", x, y, c))
-
-    products = _closure(_span(inverse[list(controls)]), symmetric)
-    return products, _closure(products, bracket)
-
-
-def _closure(rows: Array, product: Any) -> Array:
-    while len(rows) < rows.shape[1]:
-        more = _span(np.vstack([rows, *(product(x, y) for x in rows for y in rows)]))
-        if len(more) == len(rows):
-            break
-        rows = more
-    return rows
+    products = closure(_span(inverse[list(controls)]), symmetric, _span)
+    return products, closure(products, bracket_of(group.algebra), _span)
 
 
 def _span(rows: Array) -> Array:
+    """As `independent`, whatever the sizes of the rows: an inertia has units."""
     scaled = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
     _, sizes, right = np.linalg.svd(np.where(np.linalg.norm(rows, axis=1, keepdims=True) > _RANK, scaled, 0.0))
     return np.asarray(right[: int(np.sum(sizes > _RANK * max(1.0, float(sizes[0]))))])

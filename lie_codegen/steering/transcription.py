@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import ComputationError, SteeringError
-from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.simulation.metric import distance
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan, Status
@@ -27,7 +26,7 @@ from lie_codegen.steering.transcription_flow import piecewise_linear
 from lie_codegen.steering.transcription_guess import first_variables, guesses
 from lie_codegen.steering.transcription_numbers import Numbers, Options
 from lie_codegen.steering.transcription_pose import pose
-from lie_codegen.steering.transcription_problem import program
+from lie_codegen.steering.transcription_problem import endable, program
 from lie_codegen.steering.transcription_solve import Candidate, Workbench, predicted_aim, refined
 from lie_codegen.steering.transcription_structure import Structure
 
@@ -113,7 +112,7 @@ def _run(
         raise SteeringError(
             f"steer({task.group.name}): no admissible manoeuvre; {'; '.join(blocked)}; move one of them"
         )
-    names = _solvers(task, asked)
+    names = _solvers(task, structure, asked)
     candidates: list[Candidate] = []
     building = 0.0
     for name, shape in ((name, shape) for name in names for shape in (structure, replace(structure, guarded=True))):
@@ -134,12 +133,12 @@ def _run(
     return _plan(task, structure, numbers, method, tried, candidates, best, seconds)
 
 
-def _solvers(task: Task, asked: Options) -> tuple[str, ...]:
+def _solvers(task: Task, structure: Structure, asked: Options) -> tuple[str, ...]:
     """fatrop cannot couple the ends, loops for ever where drift or inertia must help the controls, and can be ended only where
     it solves a compiled program."""
     if asked.solver != "auto":
         return (asked.solver,)
-    if asked.periodic or not task.report.controllable or not find_compilers():
+    if asked.periodic or not task.report.controllable or not endable(structure):
         return ("ipopt",)
     return ("fatrop", "ipopt")
 

@@ -19,6 +19,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.steering.transcription_listener import Listener
 from lie_codegen.steering.transcription_path import path
 from lie_codegen.steering.transcription_source import compiled
@@ -109,6 +110,12 @@ def program(structure: Structure, solver: str, *, listening: bool = False) -> Pr
         np.array(gap_rows[:-1]),
         listener,
     )
+
+
+@lru_cache(maxsize=64)
+def endable(structure: Structure) -> bool:
+    """Whether fatrop can be ended on its program, a compiled one; found out once, as `program` is."""
+    return bool(find_compilers())
 
 
 def _symbolic(structure: Structure) -> dict[str, Any]:

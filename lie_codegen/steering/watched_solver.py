@@ -23,6 +23,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.runtime.child import child_environment
+
 Array = NDArray[Any]
 
 #: Seconds for one program, and more for each variable. A solve takes a tenth of it where it takes long.
@@ -106,10 +108,7 @@ class _Worker:
             if not sys.executable or getattr(sys, "frozen", False):
                 raise OSError("no Python to start")
             command = [sys.executable, "-m", "lie_codegen.steering.watched_solver"]
-            paths = os.pathsep.join(path for path in sys.path if path)
-            process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": paths}
-            )
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=child_environment())
             if process.stdin is None or process.stdout is None:
                 raise OSError("no pipes")
             running = self._running = _Running(process, process.stdin, process.stdout)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 from lie_codegen.codegen.templates import template_folder
+from lie_codegen.runtime.child import child_environment
 from lie_codegen.studies.bench_rows import Row
 from lie_codegen.studies.bench_timing import timings_of
 
@@ -53,8 +53,7 @@ def cold_row(folder: Path, rounds: int) -> Row:
     needs = {name: module for name, (module, _) in _PEERS.items()} | {"numba": "numba"}
     skipped = {name: "not installed" for name, module in needs.items() if not _there(module)}
     programs = {**warm, **cold, **{name: each for name, each in peers.items() if name not in skipped}}
-    environment = {**os.environ, "LIE_CODEGEN_CACHE": str(cache)}
-    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    environment = child_environment(LIE_CODEGEN_CACHE=str(cache))
     seen: dict[str, list[float]] = {name: [] for name in programs}
     for number in range(rounds + 1):
         for name, arguments in programs.items():
