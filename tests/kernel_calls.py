@@ -9,10 +9,10 @@ import casadi as ca
 import numpy as np
 
 import lie_codegen as lc
+from lie_codegen.groups.kernels import group_kernel
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernels.group_kernels import group_kernel
-from lie_codegen.kernels.kernel import Kernel, Port
-from lie_codegen.lowering.casadi_arithmetic import function_of
+from lie_codegen.kernel.casadi_arithmetic import function_of
+from lie_codegen.kernel.kernel import Kernel, Port
 
 
 @cache

@@ -5,8 +5,8 @@ from __future__ import annotations
 import random
 from typing import Any
 
-from lie_codegen.kernels.complex_scalar import Complex
-from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.kernel import Kernel, Port
 
 
 def _rate(ops: Any, g: Any, u: Any) -> tuple[Any, ...]:

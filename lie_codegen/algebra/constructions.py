@@ -8,9 +8,9 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number, domain_matrix, exact_number, real_coordinates, to_numbers
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import AlgebraError, DependentBasisError, InputError, NotClosedError
+from lie_codegen.exact.numbers import Number, domain_matrix, exact_number, real_coordinates, to_numbers
 
 
 def algebra_from_brackets(

@@ -8,10 +8,10 @@ from itertools import accumulate
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number, domain_matrix
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.lyndon import BracketWord, Word, bracket_word, lyndon_words, standard_factorization
 from lie_codegen.errors import InputError, UncontrollableError
+from lie_codegen.exact.numbers import Number, domain_matrix
 
 
 @dataclass(frozen=True)

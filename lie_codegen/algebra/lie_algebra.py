@@ -10,8 +10,8 @@ from itertools import combinations
 import numpy as np
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number
 from lie_codegen.errors import AlgebraError, InputError, JacobiError
+from lie_codegen.exact.numbers import Number
 from lie_codegen.identifiers import check_identifier
 
 #: Sparse vector: basis index -> coefficient, no zeros.

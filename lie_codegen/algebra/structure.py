@@ -13,7 +13,6 @@ from functools import cached_property
 import sympy as sp
 
 from lie_codegen.algebra.adjoint import ad, killing_form
-from lie_codegen.algebra.exact import Number, domain_matrix, to_numbers
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.subspace import (
     Subspace,
@@ -26,6 +25,7 @@ from lie_codegen.algebra.subspace import (
     whole,
 )
 from lie_codegen.errors import ComputationError
+from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
 
 
 @dataclass(frozen=True)

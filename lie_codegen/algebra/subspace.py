@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number, domain_matrix, to_numbers
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
 
 #: Coordinates of a vector.
 Vector = tuple[Number, ...]

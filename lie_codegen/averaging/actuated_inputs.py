@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from lie_codegen.averaging.areas import areas
 from lie_codegen.averaging.averaged import average
-from lie_codegen.averaging.input_formulas import TIME
-from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.errors import AssumptionError, InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
+from lie_codegen.signals.input_formulas import TIME
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 Array = NDArray[np.float64]
 

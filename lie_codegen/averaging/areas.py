@@ -14,7 +14,7 @@ from itertools import combinations
 import sympy as sp
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
-from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 
 def areas(u: PeriodicInput) -> sp.ImmutableMatrix:

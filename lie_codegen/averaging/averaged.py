@@ -13,14 +13,14 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.averaging.areas import areas, moments
-from lie_codegen.averaging.batched_exponential import expm
 from lie_codegen.averaging.floquet import floquet_magnus
-from lie_codegen.averaging.input_formulas import TIME
 from lie_codegen.averaging.nilpotent import nilpotency_step
-from lie_codegen.averaging.periodic_input import PeriodicInput
-from lie_codegen.averaging.time_series import expressions_of, functions_of
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
+from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.signals.input_formulas import TIME
+from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.time_series import expressions_of, functions_of
 
 Array = NDArray[Any]
 

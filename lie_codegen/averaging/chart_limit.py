@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.averaging.averaged import Averaged
-from lie_codegen.averaging.batched_exponential import expm
+from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 Array = NDArray[Any]

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 _PANELS = 64
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number, domain_matrix
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.exact.numbers import Number, domain_matrix
 
 
 def nilpotency_step(algebra: LieAlgebra) -> int | None:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.averaging.areas import area_rate, areas
-from lie_codegen.averaging.batched_exponential import expm
-from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 
 def printed_state(group: MatrixGroup, u: PeriodicInput, eps: float, t: ArrayLike) -> NDArray[Any]:

@@ -24,9 +24,9 @@ def average(
 ) -> None:
     """Average X' = eps X hat(u(t)), exactly: F_1 .. F_p, areas and moments."""
     from lie_codegen.averaging.averaged import average as make_average
-    from lie_codegen.averaging.periodic_input import PeriodicInput
+    from lie_codegen.averaging.order_check import order_check
     from lie_codegen.groups.catalogue_load import group as load
-    from lie_codegen.studies.order_check import order_check
+    from lie_codegen.signals.periodic_input import PeriodicInput
 
     g = load(group)
     started = time.perf_counter()

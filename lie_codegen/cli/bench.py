@@ -11,7 +11,7 @@ from lie_codegen.cli.groups import Json
 from lie_codegen.cli.output import emit, progress
 
 if TYPE_CHECKING:
-    from lie_codegen.studies.bench import Bench
+    from lie_codegen.benchmarks.run import Bench
 
 
 def bench(
@@ -20,7 +20,7 @@ def bench(
     json: Json = False,
 ) -> None:
     """Time calls, batches, loops and cold starts against numba, jax, SymForce, CasADi, ...; ratios to ours."""
-    from lie_codegen.studies.bench import bench as measure
+    from lie_codegen.benchmarks.run import bench as measure
 
     with progress("bench") as report:
         result = measure(rounds, report, only)

@@ -19,8 +19,8 @@ def generate(
     json: Json = False,
 ) -> None:
     """Generate the C package of a group: header, source, CMake, example, test vectors."""
+    from lie_codegen.groups.build import generate as write
     from lie_codegen.groups.catalogue_load import group as load
-    from lie_codegen.runtime.front import generate as write
 
     started = time.perf_counter()
     g = load(group)
@@ -33,7 +33,7 @@ def generate(
 
 def build(group: GroupName, json: Json = False) -> None:
     """Generate, compile, cache and load a group's kernels."""
-    from lie_codegen.runtime.front import build as build_library
+    from lie_codegen.groups.build import build as build_library
 
     started = time.perf_counter()
     library = build_library(group, kernels="all")

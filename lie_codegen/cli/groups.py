@@ -24,7 +24,7 @@ def list_groups(
 ) -> None:
     """List the catalogue."""
     if table:
-        from lie_codegen.gallery.catalogue_table import catalogue_table
+        from lie_codegen.cli.catalogue_table import catalogue_table
 
         text = catalogue_table(with_times=True)
         emit(text, {"table": text}, json)
@@ -52,9 +52,9 @@ def show(
     """Show a group: basis, brackets, structure, Wei-Norman matrix, chart and a better order, all exact."""
     from lie_codegen.groups.catalogue_load import group as load
     from lie_codegen.groups.structure import structure
-    from lie_codegen.kernels.chart_domain import chart_domain
-    from lie_codegen.kernels.wei_norman import wei_norman
-    from lie_codegen.kernels.wei_norman_order import wei_norman_order
+    from lie_codegen.groups.wei_norman.chart_domain import chart_domain
+    from lie_codegen.groups.wei_norman.matrix import wei_norman
+    from lie_codegen.groups.wei_norman.order import wei_norman_order
 
     g = load(group)
     domain, order = chart_domain(g), wei_norman_order(g)

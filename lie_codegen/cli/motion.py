@@ -28,9 +28,9 @@ def simulate(
     """Simulate X' = X hat(eps u(t)) from the identity."""
     import numpy as np
 
+    from lie_codegen.flow.formulas import formula_input
+    from lie_codegen.flow.simulate import simulate as run_simulation
     from lie_codegen.groups.catalogue_load import group as load
-    from lie_codegen.simulation.flow import simulate as run_simulation
-    from lie_codegen.simulation.formulas import formula_input
 
     g = load(group)
     if samples < 2 or not end > 0:

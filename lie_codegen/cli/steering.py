@@ -102,7 +102,7 @@ def steer(
     }
     text = f"{g.name}, {plan.method}: energy {plan.cost:.9g}, endpoint error {plan.error:.3g}\n{plan.status}"
     if picture is not None:
-        from lie_codegen.plots.steering import plot_plan
+        from lie_codegen.pictures.plot_plan import plot_plan
 
         data["picture"] = plot_plan(plan, picture, obstacles=obstacles).resolve()
         text += f"\npicture: {data['picture']}"

@@ -20,7 +20,7 @@ def numbers(text: str, option: str, labels: Sequence[str] = ()) -> list[float]:
         ShapeError: not real, or not as many as labels.
         ExpressionError: naming the column.
     """
-    from lie_codegen.algebra.expression import parse_number
+    from lie_codegen.exact.expression import parse_number
 
     values = [parse_number(part) for part in text.split(",")]
     if (labels and len(values) != len(labels)) or any(value.is_real is not True for value in values):

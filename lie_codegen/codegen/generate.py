@@ -9,7 +9,7 @@ from typing import Any
 from lie_codegen.codegen.package import render_package
 from lie_codegen.codegen.views import PackageMetadata
 from lie_codegen.codegen.write import write_package
-from lie_codegen.kernels.kernel import Kernel
+from lie_codegen.kernel.kernel import Kernel
 
 
 def generate(

@@ -19,7 +19,7 @@ from lie_codegen.codegen.views import PackageMetadata, PackageView, package_view
 from lie_codegen.codegen.write import GENERATOR
 from lie_codegen.errors import CodegenError
 from lie_codegen.identifiers import check_identifier
-from lie_codegen.kernels.kernel import Kernel
+from lie_codegen.kernel.kernel import Kernel
 
 #: What example.c allows between its results and the vectors, relative to max(1, |expected|).
 TOLERANCES = {"double": 1e-11, "float": 1e-5}

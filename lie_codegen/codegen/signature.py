@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernel.kernel import Kernel, Port
 
 
 @dataclass(frozen=True)

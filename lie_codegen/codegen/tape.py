@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any
 
 from lie_codegen.errors import CodegenError
-from lie_codegen.kernels.kernel import Kernel
+from lie_codegen.kernel.kernel import Kernel
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def tape_of(kernel: Kernel) -> Tape:
     Raises:
         CodegenError: the kernel uses an operation that has no scalar meaning.
     """
-    from lie_codegen.lowering.casadi_arithmetic import function_of
+    from lie_codegen.kernel.casadi_arithmetic import function_of
 
     return tape_of_function(function_of(kernel))
 

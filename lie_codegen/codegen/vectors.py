@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lie_codegen.errors import CodegenError
-from lie_codegen.kernels.kernel import Kernel
+from lie_codegen.kernel.kernel import Kernel
 
 #: Vectors a kernel.
 COUNT = 8
@@ -31,7 +31,7 @@ def make_vectors(kernel: Kernel, count: int = COUNT, real: str = "double") -> tu
     Raises:
         CodegenError: the sampler gives a wrong shape, or a sample has no finite answer.
     """
-    from lie_codegen.lowering.casadi_arithmetic import flatten, function_of
+    from lie_codegen.kernel.casadi_arithmetic import flatten, function_of
 
     function = function_of(kernel)
     rounded: Callable[[float], float] = _as_float if real == "float" else float

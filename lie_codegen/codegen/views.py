@@ -11,7 +11,7 @@ from lie_codegen.codegen.opcodes import C99, RESERVED, Target
 from lie_codegen.codegen.signature import is_step
 from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Tape
-from lie_codegen.kernels.kernel import Kernel, Port
+from lie_codegen.kernel.kernel import Kernel, Port
 
 _WIDTH = 108
 

@@ -12,7 +12,7 @@ All three are stable: V_0 = k_p |theta|^2/2 + omega' I omega/2 has the rate -k_d
 
 No continuous law stabilises a rotation from everywhere (Corollaries 16 and 17: SO(3) is compact and without
 boundary, so not contractible). Here the exception is the turn by 180 degrees, where log R jumps between theta and
--theta: the law is then discontinuous, takes the axis described in `kernels/rotation_log.py`, and still moves away
+-theta: the law is then discontinuous, takes the axis described in `groups/maps/rotation_log.py`, and still moves away
 from there. The way it takes is the short one: it depends on R alone, so there is no unwinding.
 """
 
@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.control.positive_matrix import as_floats, eigenvalues, positive_matrix, positive_number
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.positive_matrix import as_floats, eigenvalues, positive_matrix, positive_number
 
 #: c' of the torque's gyroscopic term, by name.
 GYROSCOPIC = {"cancel": 1, "none": 0, "double": -1}

@@ -19,8 +19,8 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
-from lie_codegen.control.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.errors import InputError
+from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 Gains = Mapping[str, Any]

@@ -13,11 +13,11 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
-from lie_codegen.control.matrix_formula import matrix_formula, scalar_formula
-from lie_codegen.control.positive_matrix import real_number
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.matrix_formula import matrix_formula, scalar_formula
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
 NAMED_TRANSPORTS = ("right", "left")

@@ -17,9 +17,9 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from lie_codegen.algebra.exact import exact_number
-from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.errors import InputError
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 TIME = sp.Symbol("t", real=True)

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.control.attitude_law import attitude_law
+from lie_codegen.control.second_order_step import second_order_step
 from lie_codegen.gallery.attitude_style import BLUE, GREY, ORANGE, RED, quiet, tidy
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.kernels.attitude_kernels import attitude_law
-from lie_codegen.kernels.group_kernels import group_kernel
-from lie_codegen.kernels.second_order_step import second_order_step
+from lie_codegen.groups.kernels import group_kernel
+from lie_codegen.mechanics.states import initial_states, split_states
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
 from lie_codegen.runtime.build import build_kernels
-from lie_codegen.simulation.second_order import initial_states, split_states
 
 _INERTIA = (6.0, 4.0, 3.0)
 _K_P = 4.0

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.control.attitude_law import attitude_law
+from lie_codegen.control.closed_loop import closed_loop
 from lie_codegen.errors import InertiaWarning
 from lie_codegen.gallery.attitude_style import BLUE, COLOURS, GREY, bare_3d, quiet, sphere, tidy
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.kernels.attitude_kernels import attitude_law
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
 from lie_codegen.runtime.build import build_kernels
-from lie_codegen.simulation.second_order import closed_loop
 
 _INERTIA, _K_P, _K_D = (6, 3, 1), 4, 6
 _THETA, _OMEGA = (1.2, -0.8, 1.0), (0.3, -0.4, 0.5)
@@ -61,7 +61,7 @@ def _rotations(theta: NDArray[Any]) -> NDArray[Any]:
 
 
 def _exponential() -> Any:
-    from lie_codegen.kernels.group_kernels import group_kernel
+    from lie_codegen.groups.kernels import group_kernel
 
     return group_kernel(group("so3"), "exp")
 

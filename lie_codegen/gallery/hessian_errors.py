@@ -7,9 +7,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from lie_codegen.gallery import derivative_errors as study
 from lie_codegen.gallery.leonard_style import BLUE, GREEN, RED, plain
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.studies import derivative_errors as study
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
 
 _COLOURS = {"lie_codegen": BLUE, "jaxlie": RED, "liecasadi": GREEN}
 _ORDERS = ("value", "first derivative", "second derivative")

@@ -8,10 +8,10 @@ from time import perf_counter
 from typing import Any
 
 from lie_codegen.averaging.averaged import average
-from lie_codegen.averaging.periodic_input import PeriodicInput
 from lie_codegen.gallery.leonard_style import SEQUENCE, plain
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 #: No order is tried beyond one that takes this long. [s]
 _LIMIT = 0.7

@@ -14,15 +14,15 @@ import numpy as np
 
 from lie_codegen.averaging.actuated_inputs import wheel_input
 from lie_codegen.averaging.averaged import average
-from lie_codegen.averaging.batched_exponential import logm
-from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.averaging.order_check import order_check
+from lie_codegen.flow.attitude_metrics import rotation_angle
+from lie_codegen.flow.batched_exponential import logm
+from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.gallery.leonard_style import BLUE, GREEN, GREY, RED, SAND, bare, plain
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.mechanics.actuators import MomentumWheels
-from lie_codegen.studies.attitude_metrics import rotation_angle
-from lie_codegen.studies.order_check import order_check
-from lie_codegen.studies.reference_flow import reference_flow
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 _WHEELS = MomentumWheels(
     inertia=[[2, "-1/20", "1/10"], ["-1/20", "17/10", "3/100"], ["1/10", "3/100", "6/5"]],

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.averaging.actuated_inputs import oscillator_areas, oscillator_average
-from lie_codegen.averaging.batched_exponential import expm, logm
-from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.flow.batched_exponential import expm, logm
+from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.gallery.leonard_style import BLUE, GREEN, GREY, RED, SAND, bare, eps_axis, plain
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.mechanics.actuators import PointMassOscillator
-from lie_codegen.studies.reference_flow import reference_flow
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 _BODY = PointMassOscillator(10, 2, [["3/2", "1/20", 0], ["1/20", "6/5", "1/25"], [0, "1/25", 1]])
 _VELOCITY = ["cos(t)", "sin(t) + 1/2*cos(2*t)", "sin(2*t)"]

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.averaging.areas import areas
-from lie_codegen.averaging.batched_exponential import logm
-from lie_codegen.averaging.periodic_input import PeriodicInput
+from lie_codegen.flow.batched_exponential import logm
+from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.gallery.leonard_style import BLUE, GREEN, RED, eps_axis, plain
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.studies.reference_flow import reference_flow
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPS = (0.4, 0.2, 0.1, 0.05)
 

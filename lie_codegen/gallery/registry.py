@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.errors import InputError
-from lie_codegen.gallery.result import GalleryResult
+from lie_codegen.pictures.result import GalleryResult
 
 
 @dataclass(frozen=True)

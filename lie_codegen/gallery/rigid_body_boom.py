@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.averaging.euler_variational import moving_parts
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.mechanics.free_rigid_body import TAU
-from lie_codegen.studies.euler_average import euler_average
-from lie_codegen.studies.euler_solutions import explicit_inertia_change, function_of_tau, solve_actual, solve_averaged
-from lie_codegen.studies.rigid_body import free_rigid_body
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.rigid_body.euler_average import euler_average
+from lie_codegen.rigid_body.euler_solutions import (
+    explicit_inertia_change,
+    function_of_tau,
+    solve_actual,
+    solve_averaged,
+)
+from lie_codegen.rigid_body.euler_variational import moving_parts
+from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
+from lie_codegen.rigid_body.principal_body import TAU
 
 _EPS, _MOMENTUM, _K0 = 0.1, 40.0, 0.5
 _BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"

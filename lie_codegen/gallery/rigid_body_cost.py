@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.kernels.elliptic_kernels import elliptic_kernels
-from lie_codegen.runtime.front import build
-from lie_codegen.studies.euler_average import euler_average
-from lie_codegen.studies.euler_solutions import solve_actual, solve_averaged
-from lie_codegen.studies.rigid_body import free_rigid_body
+from lie_codegen.groups.build import build
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.rigid_body.elliptic_kernels import elliptic_kernels
+from lie_codegen.rigid_body.euler_average import euler_average
+from lie_codegen.rigid_body.euler_solutions import solve_actual, solve_averaged
+from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
 
 _EPSILONS = (0.05, 0.025, 0.0125, 0.00625, 0.003125, 0.0015625)
 _BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"

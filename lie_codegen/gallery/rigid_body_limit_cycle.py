@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.studies.euler_average import euler_average
-from lie_codegen.studies.euler_equilibria import limit_cycles, momentum_directions
-from lie_codegen.studies.euler_solutions import solve_actual, solve_averaged
-from lie_codegen.studies.rigid_body import free_rigid_body
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.rigid_body.euler_average import euler_average
+from lie_codegen.rigid_body.euler_equilibria import limit_cycles, momentum_directions
+from lie_codegen.rigid_body.euler_solutions import solve_actual, solve_averaged
+from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
 
 _EPS = 0.1
 _BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"

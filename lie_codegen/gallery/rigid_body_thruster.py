@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.studies.euler_average import euler_average
-from lie_codegen.studies.euler_solutions import solve_actual, solve_averaged
-from lie_codegen.studies.rigid_body import free_rigid_body
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.rigid_body.euler_average import euler_average
+from lie_codegen.rigid_body.euler_solutions import solve_actual, solve_averaged
+from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
 
 _EPS, _OMEGA0, _K0 = 0.1, 1.0, 0.6
 _COLOURS = ("#1f5aa6", "#8a8f98", "#c8442f")

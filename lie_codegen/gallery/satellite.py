@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
+from lie_codegen.flow.simulate import simulate
+from lie_codegen.groups.build import build, generate
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.kernels.wei_norman import wei_norman
-from lie_codegen.runtime.front import build, generate
-from lie_codegen.simulation.flow import simulate
-from lie_codegen.steering.four_phase import average, integrals
+from lie_codegen.groups.wei_norman.matrix import wei_norman
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.steering.closed_form.four_phase import average, integrals
 from lie_codegen.steering.front import steer
 
 _GD = (0.1, 0.05, np.pi / 40)

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from lie_codegen.gallery.result import GalleryResult, save
-from lie_codegen.gallery.steering_picture import draw_plan
+from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.simulation.flow import simulate
+from lie_codegen.pictures.result import GalleryResult, save
+from lie_codegen.pictures.steering_picture import draw_plan
 from lie_codegen.steering.constraints import Cone
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.gallery.steering_loops import COLOURS, GREY, draw_loops
 from lie_codegen.groups.catalogue_load import group
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
 

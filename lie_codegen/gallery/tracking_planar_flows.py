@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.gallery.attitude_style import BLUE, RED, quiet
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.kernels.group_kernels import group_kernel
-from lie_codegen.kernels.kernel import Kernel
-from lie_codegen.kernels.tracking_kernels import tracking_law
+from lie_codegen.groups.kernels import group_kernel
+from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
 from lie_codegen.runtime.build import build_kernels
 
 _METRIC = (4.0, 1.0, 1.5)

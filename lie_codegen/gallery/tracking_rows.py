@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.control.closed_loop import ClosedLoop, closed_loop
 from lie_codegen.control.reference import FormulaReference, formula_reference
+from lie_codegen.control.reference_kernels import ReferenceBody
+from lie_codegen.control.tracking_law import tracking_law
+from lie_codegen.control.tracking_region import TrackingRegion, tracking_region
 from lie_codegen.gallery.attitude_style import COLOURS, quiet, tidy
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernels.arithmetic import FloatArithmetic
-from lie_codegen.kernels.reference_kernels import ReferenceBody
-from lie_codegen.kernels.tracking_kernels import tracking_law
-from lie_codegen.kernels.tracking_region import TrackingRegion, tracking_region
-from lie_codegen.simulation.second_order import ClosedLoop, closed_loop
+from lie_codegen.kernel.arithmetic import FloatArithmetic
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
 
 _INERTIA = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 _GAINS = {"K_1": [8, 10, 12], "K_2": [6, 7, 8], "K_d": [6, 7, 8, 10, 11, 12]}

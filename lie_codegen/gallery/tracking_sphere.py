@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.gallery.attitude_style import BLUE, COLOURS, RED, bare_3d, quiet, sphere
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
 
 Array = NDArray[Any]
 

@@ -16,20 +16,20 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from lie_codegen.averaging.periodic_input import PeriodicInput
-from lie_codegen.averaging.vibrational import vibrational_fields
-from lie_codegen.control.relative_equilibria import relative_equilibrium
-from lie_codegen.control.vibrational_feedback import VibrationalFeedback, design_feedback
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.kernels.expressions import expression_body
-from lie_codegen.kernels.kernel import Kernel, Port
-from lie_codegen.kernels.vibrational_law import closed_loop_start, feedback_kernels
+from lie_codegen.groups.build import build
+from lie_codegen.kernel.expressions import expression_body
+from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.mechanics.lagrangian import lagrangian_system
+from lie_codegen.mechanics.relative_equilibria import relative_equilibrium
 from lie_codegen.mechanics.routh import RouthReduction, routh_reduce
 from lie_codegen.mechanics.vector_fields import lie_bracket, symmetric_product
-from lie_codegen.runtime.front import build
-from lie_codegen.studies.broadcast import Array
-from lie_codegen.studies.vibrational import integrate, vibrational_average
+from lie_codegen.mechanics.vibrational_average import integrate, vibrational_average
+from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback, design_feedback
+from lie_codegen.mechanics.vibrational_fields import vibrational_fields
+from lie_codegen.mechanics.vibrational_law import closed_loop_start, feedback_kernels
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.runtime.broadcast import Array
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 _P, _RATIO, _OMEGA, _K1, _K2 = 2.00102, 0.05, 50.0, 0.7, -2.1
 _START = (1.00027, 1.6008, 0.001555, 0.0)

@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.averaging.periodic_input import PeriodicInput
-from lie_codegen.averaging.vibrational import vibrational_fields
-from lie_codegen.control.vibrational_feedback import VibrationalFeedback, design_feedback
-from lie_codegen.gallery.result import GalleryResult, new_figure, save
-from lie_codegen.kernels.vibrational_law import closed_loop_start, feedback_kernels
+from lie_codegen.groups.build import build, generate
 from lie_codegen.mechanics.lagrangian import lagrangian_system
 from lie_codegen.mechanics.routh import routh_reduce
-from lie_codegen.runtime.front import build, generate
-from lie_codegen.studies.vibrational import VibrationalAverage, vibrational_average
+from lie_codegen.mechanics.vibrational_average import VibrationalAverage, vibrational_average
+from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback, design_feedback
+from lie_codegen.mechanics.vibrational_fields import vibrational_fields
+from lie_codegen.mechanics.vibrational_law import closed_loop_start, feedback_kernels
+from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPS, _STEPS = 0.01, 60
 _BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"

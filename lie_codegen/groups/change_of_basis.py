@@ -7,8 +7,8 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import exact_number
 from lie_codegen.errors import InputError
+from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.definition import from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 

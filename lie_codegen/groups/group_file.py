@@ -18,8 +18,8 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
-from lie_codegen.algebra.exact import Number, exact_number
 from lie_codegen.errors import ExpressionError, GroupFileError, InputError, ShapeError
+from lie_codegen.exact.numbers import Number, exact_number
 from lie_codegen.groups.definition import from_brackets, from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.algebra.ideal_chain import adapted_basis
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.subspace import Subspace, Vector, annihilated, bracket, span
+from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 

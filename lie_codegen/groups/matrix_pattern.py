@@ -9,7 +9,7 @@ import sympy as sp
 from sympy.utilities.iterables import strongly_connected_components
 
 from lie_codegen.algebra.constructions import _coordinate_map
-from lie_codegen.algebra.exact import Number
+from lie_codegen.exact.numbers import Number
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import Number
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import AlgebraError, InputError, ShapeError
+from lie_codegen.exact.numbers import Number
 from lie_codegen.groups.definition import exact_matrix
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.groups.representation import faithful_representation

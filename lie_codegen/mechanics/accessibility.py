@@ -20,9 +20,9 @@ from itertools import product
 
 import sympy as sp
 
-from lie_codegen.algebra.exact import domain_matrix, exact_number
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.numbers import domain_matrix, exact_number
 from lie_codegen.mechanics.connection import symmetric_product
 from lie_codegen.mechanics.euler_poincare import bracket, euler_poincare, velocity_symbols
 

@@ -14,8 +14,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.algebra.exact import exact_number
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.numbers import exact_number
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from lie_codegen.algebra.exact import exact_number
-from lie_codegen.algebra.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.errors import ExpressionError, InputError, NotFiniteError
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.numbers import exact_number
 
 _NAME = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(?!\s*\(|\w)", re.ASCII)
 

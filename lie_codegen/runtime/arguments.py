@@ -9,7 +9,7 @@ import numpy as np
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import ShapeError
-from lie_codegen.kernels.kernel import Port
+from lie_codegen.kernel.kernel import Port
 
 Array = np.ndarray[Any, Any]
 

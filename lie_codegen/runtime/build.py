@@ -24,7 +24,7 @@ from lie_codegen.runtime.library import Library, check_names
 
 if TYPE_CHECKING:
     from lie_codegen.codegen.library_sources import LibrarySources
-    from lie_codegen.kernels.kernel import Kernel
+    from lie_codegen.kernel.kernel import Kernel
 
 
 def build_kernels(
@@ -96,7 +96,7 @@ def build_sources(
 def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:
     """The kernels run by CasADi's interpreter: no compiler, the same results."""
     from lie_codegen.codegen.package import render_library
-    from lie_codegen.lowering.casadi_arithmetic import function_of
+    from lie_codegen.kernel.casadi_arithmetic import function_of
     from lie_codegen.runtime.backend import InterpretedBackend
     from lie_codegen.runtime.call import Compiled
 

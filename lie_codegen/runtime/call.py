@@ -24,6 +24,7 @@ class Compiled:
         inputs, outputs: the ports.
         compiled: False where CasADi's interpreter stands in for C.
         result_type: named tuple of several outputs, or None.
+        signature, backend: what it computes, and what runs it.
     """
 
     def __init__(self, signature: Signature, backend: Backend, *, compiled: bool) -> None:
@@ -32,8 +33,8 @@ class Compiled:
         self.outputs = signature.outputs
         self.compiled = compiled
         self.__doc__ = documentation(signature)
-        self._signature = signature
-        self._backend = backend
+        self.signature = signature
+        self.backend = backend
         fields = [python_field(port.name) for port in signature.outputs]
         self.result_type: Any = namedtuple(f"{signature.name}_result", fields) if len(fields) > 1 else None
         self._scalar = not signature.outputs[0].shape
@@ -53,10 +54,10 @@ class Compiled:
         Raises:
             ShapeError: naming the argument, what was expected and what was given.
         """
-        values = bind(self._signature, args, named) if named or len(args) != len(self.inputs) else args
+        values = bind(self.signature, args, named) if named or len(args) != len(self.inputs) else args
         arrays = [checked(self.name, port, value) for port, value in zip(self.inputs, values, strict=True)]
-        outputs = outputs_for(self._signature, out, ())
-        self._backend.call(arrays, outputs)
+        outputs = outputs_for(self.signature, out, ())
+        self.backend.call(arrays, outputs)
         return self._wrap(outputs, out, scalars=True)
 
     def batch(self, *args: Any, out: Any = None, threads: int = 1, **named: Any) -> Any:
@@ -74,17 +75,17 @@ class Compiled:
         Raises:
             ShapeError: as for a call; or no input has the leading axis, or two lengths differ.
         """
-        values = bind(self._signature, args, named)
-        arrays, strides, count = sequences(self._signature, values, "samples", self.inputs)
+        values = bind(self.signature, args, named)
+        arrays, strides, count = sequences(self.signature, values, "samples", self.inputs)
         if count is None:
             raise ShapeError(f"{self.name}.batch: no input has a leading axis of samples; call {self.name} itself")
-        outputs = outputs_for(self._signature, out, (count,))
+        outputs = outputs_for(self.signature, out, (count,))
         if out is not None:
             arrays = unshared(arrays, outputs)
 
         def some(start: int, stop: int) -> None:
             mine = [array[start:stop] if stride else array for array, stride in zip(arrays, strides, strict=True)]
-            self._backend.batch(stop - start, mine, strides, [array[start:stop] for array in outputs])
+            self.backend.batch(stop - start, mine, strides, [array[start:stop] for array in outputs])
 
         in_parts(some, count, threads)
         return self._wrap(outputs, out, scalars=False)
@@ -108,18 +109,18 @@ class Compiled:
             ShapeError: as for a batch.
         """
         self._check_loop("scan", n, every)
-        start, *rest = bind(self._signature, args, named)
+        start, *rest = bind(self.signature, args, named)
         state = checked(self.name, self.inputs[0], start)
-        arrays, strides, count = sequences(self._signature, rest, "steps", self.inputs[1:])
+        arrays, strides, count = sequences(self.signature, rest, "steps", self.inputs[1:])
         if count is not None and count != n:
             raise ShapeError(f"{self.name}.scan: inputs have {count} steps, n = {n}")
         port = self.outputs[0]
-        only = Signature(self.name, self._signature.symbol, self.inputs, (port,))
+        only = Signature(self.name, self.signature.symbol, self.inputs, (port,))
         (trajectory,) = outputs_for(only, out, (int(n) // int(every) + 1,))
         arrays = [state, *arrays]
         if out is not None:
             arrays = unshared(arrays, [trajectory])
-        self._backend.scan(int(n), int(every), arrays, [0, *strides], trajectory)
+        self.backend.scan(int(n), int(every), arrays, [0, *strides], trajectory)
         return trajectory
 
     def scan_batch(self, *args: Any, n: int, every: int = 1, out: Any = None, threads: int = 1, **named: Any) -> Array:
@@ -140,17 +141,17 @@ class Compiled:
             InputError, ShapeError: as for `scan`.
         """
         self._check_loop("scan_batch", n, every)
-        values = bind(self._signature, args, named)
-        arrays, strides, count = loops(self._signature, values, int(n))
+        values = bind(self.signature, args, named)
+        arrays, strides, count = loops(self.signature, values, int(n))
         port = self.outputs[0]
-        only = Signature(self.name, self._signature.symbol, self.inputs, (port,))
+        only = Signature(self.name, self.signature.symbol, self.inputs, (port,))
         (trajectories,) = outputs_for(only, out, (count, int(n) // int(every) + 1))
         if out is not None:
             arrays = unshared(arrays, [trajectories])
 
         def some(start: int, stop: int) -> None:
             mine = [array if lane == 0 else array[start:stop] for array, (lane, _) in zip(arrays, strides, strict=True)]
-            self._backend.scan_batch(stop - start, int(n), int(every), mine, strides, trajectories[start:stop])
+            self.backend.scan_batch(stop - start, int(n), int(every), mine, strides, trajectories[start:stop])
 
         in_parts(some, count, threads)
         return trajectories
@@ -222,7 +223,7 @@ class Compiled:
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
-        return f"<{how} kernel {_prototype(self._signature)}>"
+        return f"<{how} kernel {_prototype(self.signature)}>"
 
 
 def documentation(signature: Signature) -> str:

@@ -6,24 +6,32 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lie_codegen.codegen.signature import is_step
+from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, InputError, ShapeError
-from lie_codegen.kernels.kernel import Port
+from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.arguments import Array, dtype_of
 from lie_codegen.runtime.arguments_scan import loops
-from lie_codegen.runtime.backend import load_library
+from lie_codegen.runtime.backend import Backend, load_library
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import in_parts
 
-if TYPE_CHECKING:
-    from lie_codegen.runtime.call import Compiled
+
+class Step(Protocol):
+    """What a loop needs of the step that it repeats."""
+
+    signature: Signature
+    backend: Backend
+
+    def scan_batch(self, *args: Any, n: int, every: int = 1, out: Any = None, threads: int = 1, **named: Any) -> Array:
+        """Its own loop over many trajectories, for what the driven C loop does not take."""
+
 
 #: Where in a step the inputs of the integrators read u.
 STAGES: Mapping[str, float] = {"u0": 0.0, "um": 0.5, "u1": 1.0}
@@ -94,7 +102,7 @@ class _Ports(ctypes.Structure):
 
 
 def driven_loop(
-    compiled: Compiled,
+    compiled: Step,
     start: Array,
     u: FormulaInput,
     spans: Spans,
@@ -122,10 +130,10 @@ def driven_loop(
         InputError, ShapeError: naming the argument.
     """
     plan, many = _plan(compiled, start, u, spans, at, dict(others or {}))
-    state = compiled.inputs[0]
+    state = compiled.signature.inputs[0]
     found = np.empty((plan.count, spans.count + 1, *state.shape), dtype_of(state))
     moves: list[float] = [0.0]
-    loop = _c_loop if compiled._backend.loop_address(many=False) and _library() else _numpy_loop
+    loop = _c_loop if compiled.backend.loop_address(many=False) and _library() else _numpy_loop
 
     def some(first: int, last: int) -> None:
         moves.append(loop(compiled, plan, u, spans, first, last, found))
@@ -135,10 +143,10 @@ def driven_loop(
 
 
 def _plan(
-    compiled: Compiled, start: Array, u: FormulaInput, spans: Spans, at: Mapping[str, float], others: dict[str, Any]
+    compiled: Step, start: Array, u: FormulaInput, spans: Spans, at: Mapping[str, float], others: dict[str, Any]
 ) -> tuple[_Plan, bool]:
-    name, ports = compiled.name, compiled.inputs
-    if not is_step(ports, compiled.outputs):
+    name, ports = compiled.signature.name, compiled.signature.inputs
+    if not is_step(ports, compiled.signature.outputs):
         raise InputError(f"{name}: the first output is not of the shape of the first input; it cannot be iterated")
     driven = {port.name: at[port.name] for port in ports[1:] if port.name in at}
     if not driven:
@@ -160,7 +168,7 @@ def _plan(
         raise ShapeError(f"{name} has no argument {next(iter(others))!r}")
     if u.trajectories is not None and len(values[0]) == 1:
         values[0] = np.repeat(values[0], u.trajectories, axis=0)
-    arrays, strides, count = loops(compiled._signature, values, spans.count * spans.parts)
+    arrays, strides, count = loops(compiled.signature, values, spans.count * spans.parts)
     if u.trajectories not in (None, count):
         raise ShapeError(f"{name}: u has {u.trajectories} trajectories, the other inputs have {count}")
     point = [-1, *(points.index(driven[port.name]) if port.name in driven else -1 for port in ports[1:])]
@@ -210,15 +218,13 @@ def _library() -> ctypes.CDLL | None:
     return library
 
 
-def _c_loop(
-    compiled: Compiled, plan: _Plan, u: FormulaInput, spans: Spans, first: int, last: int, found: Array
-) -> float:
+def _c_loop(compiled: Step, plan: _Plan, u: FormulaInput, spans: Spans, first: int, last: int, found: Array) -> float:
     library = _library()
     if library is None:
         return _numpy_loop(compiled, plan, u, spans, first, last, found)
-    state, count = compiled.inputs[0].size, last - first
-    scan = compiled._backend.loop_address(many=False)
-    batch = compiled._backend.loop_address(many=True) if count > 1 else 0
+    state, count = compiled.signature.inputs[0].size, last - first
+    scan = compiled.backend.loop_address(many=False)
+    batch = compiled.backend.loop_address(many=True) if count > 1 else 0
     at, point = np.ascontiguousarray(plan.at), np.array(plan.point, dtype=np.intp)
     lane, step = (np.array([pair[side] for pair in plan.strides], dtype=np.intp) for side in (0, 1))
     pointers = np.array(
@@ -263,7 +269,7 @@ def _signal(u: FormulaInput, first: int) -> _Signal:
 
 
 def _numpy_loop(
-    compiled: Compiled, plan: _Plan, u: FormulaInput, spans: Spans, first: int, last: int, found: Array
+    compiled: Step, plan: _Plan, u: FormulaInput, spans: Spans, first: int, last: int, found: Array
 ) -> float:
     """The same without the driver: u by numpy, block by block."""
     total, largest = spans.count * spans.parts, 0.0
@@ -279,7 +285,7 @@ def _numpy_loop(
         values = values[first:last] if own else values[None]
         largest = max(largest, float(np.max(lengths[:, None] * np.linalg.norm(values, axis=-1), initial=0.0)))
         arguments = [state]
-        for number, (array, port) in enumerate(zip(mine, compiled.inputs, strict=True)):
+        for number, (array, port) in enumerate(zip(mine, compiled.signature.inputs, strict=True)):
             if number == 0:
                 continue
             if plan.point[number] >= 0:

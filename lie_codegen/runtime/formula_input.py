@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-
-if TYPE_CHECKING:
-    from lie_codegen.averaging.periodic_input import PeriodicInput
 
 Array = NDArray[np.float64]
 
@@ -91,6 +88,14 @@ class FormulaInput:
         return np.asarray(total + np.where(left == right, left, left + x * (right - left)))
 
 
+@runtime_checkable
+class HasFormula(Protocol):
+    """An input that can say itself as a formula: periodic, sampled, in pieces."""
+
+    def as_formula(self, start: float, end: float) -> FormulaInput | None:
+        """u on [start, end]; None where it is no such formula."""
+
+
 def fourier_input(
     rates: ArrayLike, cosines: ArrayLike, sines: ArrayLike, *, rates_low: ArrayLike | None = None
 ) -> FormulaInput:
@@ -135,31 +140,11 @@ def formula_input(u: Any, start: float, end: float) -> FormulaInput | None:
     """What u is on [start, end] as a formula; None where it is none.
 
     Args:
-        u: a FormulaInput, a PeriodicInput of sines and cosines or of straight pieces, a SampledInput.
+        u: an input that says so itself, by a method as_formula(start, end).
     """
     if isinstance(u, FormulaInput):
         return u
-    own = getattr(u, "formula", None)
-    if isinstance(own, FormulaInput):
-        return own
-    if hasattr(u, "waveform"):
-        return _periodic(u, start, end)
-    return None
-
-
-def _periodic(u: PeriodicInput, start: float, end: float) -> FormulaInput | None:
-    from lie_codegen.averaging.formula_tables import fourier_table, piece_table
-
-    series = fourier_table(u)
-    if series is not None:
-        return fourier_input(series.rates, series.cosines, series.sines, rates_low=series.rates_low)
-    pieces = piece_table(u)
-    if pieces is None:
-        return None
-    first, last = int(np.floor(start / u.T)), max(int(np.ceil(end / u.T)), int(np.floor(start / u.T)) + 1)
-    whole = np.arange(first, last)
-    times = np.append((whole[:, None] * u.T + pieces.starts).ravel(), last * u.T)
-    return lines_input(times, np.tile(pieces.left, (len(whole), 1)), np.tile(pieces.right, (len(whole), 1)))
+    return u.as_formula(start, end) if isinstance(u, HasFormula) else None
 
 
 def _table(values: Any) -> Array:

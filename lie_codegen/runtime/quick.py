@@ -7,7 +7,7 @@ from functools import cache, wraps
 from typing import Any, cast
 
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.kernels.kernel import Port
+from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.extension import extension
 from lie_codegen.runtime.lane_library import LaneLibrary

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import ShapeError, SteeringInputError
-from lie_codegen.simulation.flow import simulate
-from lie_codegen.simulation.metric import distance, element_coordinates
+from lie_codegen.flow.metric import distance, element_coordinates
+from lie_codegen.flow.simulate import simulate
 from lie_codegen.steering.finish import energy
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by
 from lie_codegen.steering.plan import Controls, Plan, Status

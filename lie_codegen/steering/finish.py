@@ -11,8 +11,8 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from lie_codegen.simulation.flow import simulate
-from lie_codegen.simulation.metric import distance
+from lie_codegen.flow.metric import distance
+from lie_codegen.flow.simulate import simulate
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
 

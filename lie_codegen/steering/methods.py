@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lie_codegen.errors import SteeringInputError
-from lie_codegen.steering.area_rule import area_rule
-from lie_codegen.steering.circle import circle
-from lie_codegen.steering.four_phase import four_phase
-from lie_codegen.steering.loops import loops
+from lie_codegen.steering.closed_form.area_rule import area_rule
+from lie_codegen.steering.closed_form.circle import circle
+from lie_codegen.steering.closed_form.four_phase import four_phase
+from lie_codegen.steering.closed_form.loops import loops
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription import transcription
+from lie_codegen.steering.transcription.transcribe import transcription
 
 Method = Callable[..., Plan]
 

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError
-from lie_codegen.steering.extremal import Extremal
-from lie_codegen.steering.extremals import SOLVED, Extremals
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, PlanOnDemand, Status
-from lie_codegen.steering.shooting import Shooter, shooter
+from lie_codegen.steering.shooting.extremal import Extremal
+from lie_codegen.steering.shooting.extremals import SOLVED, Extremals
+from lie_codegen.steering.shooting.shooter import Shooter, shooter
 from lie_codegen.steering.task import Task
 
 Array = NDArray[Any]
@@ -80,7 +80,7 @@ def optimal(
     if found.residual[0] <= _CLOSE * task.tolerance:
         seconds = {"build": built - started, "solve": time.perf_counter() - built}
         return _plan(task, solver, found, w, tuple(tried), seconds)
-    from lie_codegen.steering.transcription import least_energy
+    from lie_codegen.steering.transcription.transcribe import least_energy
 
     say("shooting failed: transcription")
     return least_energy(task, weights=w, tried=tuple(tried), progress=progress)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernels.element_pattern import varying_entries
 
 Array = NDArray[Any]
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.flow.metric import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.simulation.metric import element_coordinates
 from lie_codegen.steering.task import Task
 
 Array = NDArray[Any]

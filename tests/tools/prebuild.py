@@ -13,15 +13,15 @@ from typing import Any
 
 import lie_codegen as lc
 from lie_codegen.codegen.package import render_library
+from lie_codegen.groups.build import object_definition, source_definition
 from lie_codegen.groups.catalogue_names import definition_source
+from lie_codegen.groups.kernels import group_kernels
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernels.group_kernels import group_kernels
+from lie_codegen.groups.prebuilt import SHARED, SHARED_STORE, prebuilt_folder, source_digest
 from lie_codegen.runtime.digests import digest, versions
-from lie_codegen.runtime.front import object_definition, source_definition
-from lie_codegen.runtime.prebuilt import SHARED, SHARED_STORE, prebuilt_folder, source_digest
 
 #: What turns a group into C text; everything they import counts.
-ROOTS = ("groups/catalogue_load.py", "kernels/group_kernels.py", "codegen/package.py", "codegen/library_sources.py")
+ROOTS = ("groups/catalogue_load.py", "groups/kernels.py", "codegen/package.py", "codegen/library_sources.py")
 TEMPLATES = ("binding.c.jinja", "header.h.jinja", "lanes.h.jinja", "macros.jinja", "source.c.jinja")
 PACKAGE = Path(lc.__file__).parent
 

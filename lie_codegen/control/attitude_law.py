@@ -1,0 +1,236 @@
+"""Attitude laws on SO(3) as kernels; see `lie_codegen.control.attitude` for the formulas and their errata."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from lie_codegen.control.attitude import gyroscopic_factor
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.positive_matrix import body_inertia, positive_number, real_number
+from lie_codegen.groups.maps.rotation_log import half_angle_ratio, rotation_log
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import (
+    Matrix,
+    Vector,
+    constant_matrix,
+    cross,
+    dot,
+    matmul,
+    matvec,
+    minus,
+    number,
+    plus,
+    scaled,
+)
+
+_KINDS = ("p", "pd", "reduced")
+_ATTITUDE = Port("X", (3, 3), description="attitude error: body to reference, R_d' R")
+_RATE = Port("omega", (3,), "rad/s", description="body angular velocity")
+
+
+def attitude_law(
+    kind: str,
+    *,
+    inertia: Any = None,
+    k_p: Any = 1,
+    k_d: Any = None,
+    gyroscopic: str = "cancel",
+    z: Sequence[Any] = (0, 0, 1),
+) -> Kernel:
+    """An attitude law of Geyer's paper.
+
+    Args:
+        kind: "p", (X) -> (omega, V, V_dot), the law (17); "pd", (X, omega) -> (torque, V, V_dot), the law (18);
+            "reduced", (y) -> (omega, V, V_dot), Proposition 22 for a body sensor y = R' z.
+        inertia: [kg m^2], for "pd"; "p" and "reduced" command a velocity and use none of inertia, k_d, gyroscopic:
+            these are checked and ignored there, so that one call serves all kinds.
+        k_p: [1/s] for "p" and "reduced", [N m/rad] for "pd".
+        k_d: [N m s/rad], for "pd".
+        gyroscopic: "cancel", "none" or "double", for "pd".
+        z: the inertial direction that the sensor of "reduced" sees, of any length.
+
+    Raises:
+        InputError: an unknown kind or gyroscopic term, an indefinite inertia, a gain that is not positive.
+
+    Warns:
+        InertiaWarning: the inertia belongs to no rigid body (triangle inequality).
+    """
+    if kind not in _KINDS:
+        raise InputError(f"attitude law {kind!r} is not known; choose one of {', '.join(_KINDS)}")
+    if kind == "pd":
+        if inertia is None or k_d is None:
+            raise InputError("the attitude law 'pd' needs inertia and k_d")
+        return _proportional_derivative(inertia, k_p, k_d, gyroscopic)
+    if inertia is not None:
+        body_inertia(inertia)
+    if k_d is not None:
+        positive_number(k_d, "k_d")
+    gyroscopic_factor(gyroscopic)
+    return _proportional(k_p) if kind == "p" else _reduced(k_p, z)
+
+
+def _proportional(k_p: Any) -> Kernel:
+    k = positive_number(k_p, "k_p")
+
+    def body(ops: Arithmetic, X: Matrix) -> tuple[Any, ...]:
+        theta = rotation_log(ops, X)
+        gain, square = number(ops, k), dot(theta, theta)
+        return scaled(-gain, theta), square / 2, -gain * square
+
+    return Kernel(
+        name="attitude_p",
+        namespace="so3",
+        inputs=(_ATTITUDE,),
+        outputs=(
+            Port("omega", (3,), "rad/s", description="commanded body angular velocity"),
+            Port("V", (), "rad^2", description="|theta|^2/2"),
+            Port("V_dot", (), "rad^2/s", description="-k_p |theta|^2"),
+        ),
+        body=body,
+        formula="omega = -k_p log R; R(t) = exp(e^{-k_p t} log R(0))",
+        source="Geyer, The Attitude Control Problem, (17) with omega where omega' is printed",
+        sampler=lambda rng: (_rotation(rng),),
+    )
+
+
+def _proportional_derivative(inertia: Any, k_p: Any, k_d: Any, gyroscopic: str) -> Kernel:
+    metric = body_inertia(inertia)
+    p, d = positive_number(k_p, "k_p"), positive_number(k_d, "k_d")
+    factor = gyroscopic_factor(gyroscopic)
+
+    def body(ops: Arithmetic, X: Matrix, omega: Vector) -> tuple[Any, ...]:
+        theta = rotation_log(ops, X)
+        momentum = matvec(constant_matrix(ops, metric), omega)
+        action = plus(scaled(number(ops, p), theta), scaled(number(ops, d), omega))
+        torque = minus(scaled(factor, cross(omega, momentum)), action)
+        V = (number(ops, p) * dot(theta, theta) + dot(omega, momentum)) / 2
+        return torque, V, -number(ops, d) * dot(omega, omega)
+
+    return Kernel(
+        name="attitude_pd",
+        namespace="so3",
+        inputs=(_ATTITUDE, _RATE),
+        outputs=(
+            Port("torque", (3,), "N m", description="body torque tau of I omega' = -omega x I omega + tau"),
+            Port("V", (), "J", description="k_p |theta|^2/2 + omega' I omega/2"),
+            Port("V_dot", (), "W", description="-k_d |omega|^2"),
+        ),
+        body=body,
+        formula=f"tau = {factor} omega x I omega - k_p log R - k_d omega",
+        source="Geyer, The Attitude Control Problem, (18); the printed sign of omega x I omega goes with the printed (3)",
+        sampler=lambda rng: (_rotation(rng), [rng.uniform(-1, 1) for _ in range(3)]),
+    )
+
+
+def _reduced(k_p: Any, z: Sequence[Any]) -> Kernel:
+    k = positive_number(k_p, "k_p")
+    if len(z) != 3:
+        raise ShapeError(f"z has {len(z)} entries; give the three of an inertial direction")
+    exact = [real_number(entry, f"z[{i}]") for i, entry in enumerate(z)]
+    length = sp.sqrt(sum(entry**2 for entry in exact))
+    if length == 0:
+        raise InputError("z is zero; give the inertial direction that the sensor sees")
+    unit = [entry / length for entry in exact]
+
+    def body(ops: Arithmetic, y: Vector) -> tuple[Any, ...]:
+        axis = [number(ops, entry) for entry in unit]
+        normal, cosine = cross(axis, y), dot(axis, y)
+        ratio = _angle_over_sine(ops, dot(normal, normal), cosine)
+        error, gain = scaled(ratio, normal), number(ops, k)
+        square = dot(error, error)
+        return scaled(gain, error), square / 2, -gain * square
+
+    return Kernel(
+        name="attitude_reduced",
+        namespace="so3",
+        inputs=(Port("y", (3,), description="measured direction R' z in the body frame, of unit length"),),
+        outputs=(
+            Port("omega", (3,), "rad/s", description="commanded body angular velocity"),
+            Port("V", (), "rad^2", description="alpha^2/2, alpha the angle from y to z"),
+            Port("V_dot", (), "rad^2/s", description="-k_p alpha^2"),
+        ),
+        body=body,
+        formula="omega = k_p alpha (z x y)/|z x y|; alpha(t) = alpha(0) e^{-k_p t}; singular at y = -z alone",
+        source="Geyer, The Attitude Control Problem, Proposition 22, for y = R' z",
+        sampler=lambda rng: ([row[2] for row in _rotation(rng)],),
+    )
+
+
+def _angle_over_sine(ops: Arithmetic, sine_squared: Scalar, cosine: Scalar) -> Scalar:
+    """alpha/sin alpha for alpha in [0, pi), by the half angle: alpha = 2 atan2(sin alpha, 1 + cos alpha).
+
+    At alpha = pi the direction is lost: the value there is 0, the law commands nothing, and any disturbance leaves
+    that set.
+    """
+    away = ops.less(-1 + _ANTIPODE, cosine)
+    safe = ops.where(away, 1 + cosine, 1)
+    tangent_squared = ops.where(away, sine_squared, 0) / (safe * safe)
+    return ops.where(away, half_angle_ratio(ops, 1, tangent_squared) / safe, 0)
+
+
+#: Distance of the cosine from -1 below which the antipode is treated as reached.
+_ANTIPODE = 1e-14
+
+
+def attitude_lyapunov(
+    *, inertia: Any, k_p: Any, k_d: Any, epsilon: Any, gyroscopic: str = "none", name: str = "attitude_lyapunov"
+) -> Kernel:
+    """The strict Lyapunov function of Proposition 21 and its rate: (X, omega) -> (V, V_dot).
+
+        V = k_p |theta|^2/2 + omega' I omega/2 + epsilon theta' I omega
+
+    V_dot is the derivative along the closed loop, by a dual number through the logarithm itself, so that it holds for
+    every gyroscopic term; for epsilon below `cross_term_bound` it is negative for gyroscopic "none" and |theta| < pi.
+
+    Raises:
+        InputError: as `attitude_law`.
+    """
+    metric = body_inertia(inertia)
+    p, d, e = (positive_number(v, w) for v, w in ((k_p, "k_p"), (k_d, "k_d"), (epsilon, "epsilon")))
+    c = gyroscopic_factor(gyroscopic) - 1
+
+    def body(ops: Arithmetic, X: Matrix, omega: Vector) -> tuple[Any, ...]:
+        dual = DualArithmetic(ops)
+        wx = [[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]]
+        rate = matmul(X, wx)
+        moving = [[dual.variable(X[i][j], {0: rate[i][j]}) for j in range(3)] for i in range(3)]
+        logarithm = rotation_log(dual, moving)
+        theta = [value_of(entry, dual.level) for entry in logarithm]
+        theta_dot = [tangent_of(entry, 0, dual.level) for entry in logarithm]
+        momentum = matvec(constant_matrix(ops, metric), omega)
+        action = plus(scaled(number(ops, p), theta), scaled(number(ops, d), omega))
+        force = minus(scaled(c, cross(omega, momentum)), action)
+        kp, ke = number(ops, p), number(ops, e)
+        V = (kp * dot(theta, theta) + dot(omega, momentum)) / 2 + ke * dot(theta, momentum)
+        crossing = dot(theta_dot, momentum) + dot(theta, force)
+        return V, -number(ops, d) * dot(omega, omega) + ke * crossing
+
+    return Kernel(
+        name=name,
+        namespace="so3",
+        inputs=(_ATTITUDE, _RATE),
+        outputs=(Port("V", (), "J"), Port("V_dot", (), "W")),
+        body=body,
+        formula="V = k_p |theta|^2/2 + omega' I omega/2 + epsilon theta' I omega, and dV/dt along the closed loop",
+        source="Geyer, The Attitude Control Problem, proof of Proposition 21",
+        sampler=lambda rng: (_rotation(rng), [rng.uniform(-1, 1) for _ in range(3)]),
+    )
+
+
+def _rotation(rng: random.Random) -> list[list[float]]:
+    """A rotation by a random unit quaternion."""
+    q = np.array([rng.gauss(0, 1) for _ in range(4)])
+    a, b, c, d = q / np.linalg.norm(q)
+    R = [
+        [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+        [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
+        [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
+    ]
+    return [[float(entry) for entry in row] for row in R]

@@ -1,0 +1,116 @@
+"""A law for flight as a C package, with closed_loop.c: the law, its reference and the body it controls in one small program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.control.reference import Reference
+from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.second_order_step import check_loop, held_force_step, law_states
+from lie_codegen.errors import InputError
+from lie_codegen.exact.positive_matrix import positive_number
+from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.mechanics.states import initial_states
+
+_SHOWN = 50
+
+
+@dataclass(frozen=True)
+class LoopView:
+    """What closed_loop.c.jinja sees."""
+
+    namespace: str
+    law: str
+    reference: str
+    plant: str
+    energy: str
+    outputs: tuple[tuple[str, int], ...]
+    own: tuple[tuple[str, int], ...]
+    entries: int
+    matrix_size: int
+    dim: int
+    places: tuple[int, ...]
+    identity: tuple[str, ...]
+    state: tuple[str, ...]
+    step: str
+    steps: int
+    shown: int
+
+
+def generate_closed_loop(
+    group: MatrixGroup,
+    folder: str | Path,
+    *,
+    inertia: Any,
+    law: Kernel,
+    reference: Reference | None = None,
+    X0: ArrayLike | None = None,
+    xi0: ArrayLike | None = None,
+    duration: float = 20.0,
+    step: float = 0.01,
+) -> Path:
+    """The C package of the law (and its reference and body), with closed_loop.c; returns the folder.
+
+    Args:
+        group: the group.
+        folder: where to write.
+        inertia, law, reference, X0, xi0: as `closed_loop`.
+        duration: [s] that closed_loop.c simulates.
+        step: [s] from one call of the law to the next; its force, and the rates of states of its own, are held between.
+
+    Raises:
+        InputError: as `closed_loop`; a duration or step that is not positive.
+        OutputFolderError: the folder cannot be written, or holds files that are not ours.
+    """
+    from lie_codegen.codegen.package import render_package
+    from lie_codegen.codegen.templates import render
+    from lie_codegen.codegen.write import write_package
+
+    for value, what in ((duration, "duration"), (step, "step")):
+        positive_number(value, what)
+    check_loop(law, reference)
+    kernels = [law, held_force_step(group, inertia)]
+    kernels += [] if reference is None else [reference_kernel(reference)]
+    start, many = initial_states(group, X0, xi0)
+    if many:
+        raise InputError("closed_loop.c runs from one initial state: give one X0 and one xi0")
+    view = _view(group, law, reference, start[0], duration, step)
+    extra = {"closed_loop.c": render("closed_loop.c.jinja", loop=view)}
+    return write_package(render_package(group.name, kernels, extra=extra), folder)
+
+
+def _view(
+    group: MatrixGroup, law: Kernel, reference: Reference | None, state: Any, duration: float, step: float
+) -> LoopView:
+    parts = 2 if group.is_complex else 1
+    d = group.degree
+    places = tuple(parts * (i * d + j) + part for i, j in varying_entries(group) for part in range(parts))
+    eye = np.eye(d, dtype=complex if group.is_complex else float).view(float).ravel()
+    names = [port.name for port in law.outputs]
+    energy = next((name for name in ("W", "V") if name in names), names[-1])
+    steps = round(duration / step)
+    return LoopView(
+        namespace=group.name,
+        law=law.name,
+        reference="" if reference is None else "reference",
+        plant="held_force_step",
+        energy=energy,
+        outputs=tuple((port.name, port.size) for port in law.outputs),
+        own=tuple((port.name, port.size) for port in law_states(law)),
+        entries=packed_size(group),
+        matrix_size=parts * d * d,
+        dim=group.dim,
+        places=places,
+        identity=tuple(repr(float(x)) for x in eye),
+        state=tuple(repr(float(x)) for x in state),
+        step=repr(float(step)),
+        steps=steps,
+        shown=max(1, steps // _SHOWN),
+    )

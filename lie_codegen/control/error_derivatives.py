@@ -1,0 +1,119 @@
+"""What a tracking law needs of a pair (phi, transport), derived by dual numbers along left-invariant directions.
+
+    d_1 phi_a = d/ds phi(X exp(s A_a), X_d),   d_2 phi_a = d/ds phi(X, X_d exp(s A_a)),
+    nu = P(X, X_d) xi_d,   nu' = d/dt nu along X' = X hat(xi), X_d' = X_d hat(xi_d).
+
+X -> X A_a and X^{-1} -> -A_a X^{-1} are the only rules; nothing is differenced or simplified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
+from lie_codegen.groups.maps.matrices import GroupMatrices
+from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
+from lie_codegen.kernel.expressions import ExpressionEvaluator
+from lie_codegen.kernel.linear import Matrix, Vector, bracket, matmul, matvec, minus, negative
+
+
+class ErrorDerivatives:
+    """One pair at one point (X, X_d), in one arithmetic."""
+
+    def __init__(self, ops: Arithmetic, error: ErrorFunction, real: RealMatrices, X: Matrix, X_d: Matrix) -> None:
+        self.ops = ops
+        self.error = error
+        self.real = real
+        self.group = GroupMatrices(ops, real)
+        self.X, self.X_d = X, X_d
+        self.X_inverse, self.X_d_inverse = self.group.inverse(X), self.group.inverse(X_d)
+        self.dual = DualArithmetic(ops)
+
+    def differential(self, argument: int = 1) -> tuple[Scalar, Vector]:
+        """phi and its differential in the first or the second argument, in body coordinates."""
+        basis = [self.group.hat([int(a == b) for b in range(self.real.group.dim)]) for a in range(self.real.group.dim)]
+        first = argument == 1
+        X, Xi = (self._moved(self.X, self.X_inverse, basis)) if first else (self.X, self.X_inverse)
+        Xd, Xdi = (self.X_d, self.X_d_inverse) if first else self._moved(self.X_d, self.X_d_inverse, basis)
+        phi = self._evaluator(X, Xi, Xd, Xdi)(self.error.phi)
+        level = self.dual.level
+        return value_of(phi, level), [tangent_of(phi, a, level) for a in range(self.real.group.dim)]
+
+    def transport_matrix(self) -> Matrix:
+        """P with nu = P xi_d, row by row."""
+        n = self.real.group.dim
+        columns = [self.transported([int(a == b) for b in range(n)]) for a in range(n)]
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def transported(self, xi_d: Sequence[Scalar]) -> Vector:
+        """nu = P xi_d."""
+        return self._transport(self.group, self.X, self.X_inverse, self.X_d, self.X_d_inverse, xi_d)
+
+    def transported_rates(
+        self, xi: Sequence[Scalar], xi_d: Sequence[Scalar], xi_d_dot: Sequence[Scalar]
+    ) -> tuple[Vector, Vector, Vector]:
+        """nu, nu' and nu' + [xi, nu]; the last is Ad_{X^-1 X_d} xi_d' for the right transport."""
+        algebra = self.real.group.algebra
+        if self.error.transport == "left":
+            nu, nu_dot = list(xi_d), list(xi_d_dot)
+            return nu, nu_dot, [a + b for a, b in zip(nu_dot, bracket(self.ops, algebra, xi, nu), strict=True)]
+        if self.error.transport == "right":
+            nu, turned = self.transported(xi_d), self.transported(xi_d_dot)
+            return nu, minus(turned, bracket(self.ops, algebra, xi, nu)), turned
+        X, Xi = self._moved(self.X, self.X_inverse, [self.group.hat(xi)])
+        Xd, Xdi = self._moved(self.X_d, self.X_d_inverse, [self.group.hat(xi_d)])
+        velocity = [self.dual.variable(v, {0: a}) for v, a in zip(xi_d, xi_d_dot, strict=True)]
+        moving = self._transport(GroupMatrices(self.dual, self.real), X, Xi, Xd, Xdi, velocity)
+        level = self.dual.level
+        nu = [value_of(entry, level) for entry in moving]
+        nu_dot = [tangent_of(entry, 0, level) for entry in moving]
+        return nu, nu_dot, [a + b for a, b in zip(nu_dot, bracket(self.ops, algebra, xi, nu), strict=True)]
+
+    def _moved(self, X: Matrix, X_inverse: Matrix, directions: Sequence[Matrix]) -> tuple[Matrix, Matrix]:
+        """X and X^{-1} with the tangents X B and -B X^{-1} for each direction B."""
+        forward = [matmul(X, B) for B in directions]
+        backward = [[negative(row) for row in matmul(B, X_inverse)] for B in directions]
+        return self._with_tangents(X, forward), self._with_tangents(X_inverse, backward)
+
+    def _with_tangents(self, matrix: Matrix, tangents: Sequence[Matrix]) -> Matrix:
+        size = range(len(matrix))
+        result: Matrix = []
+        for i in size:
+            row: list[Scalar] = []
+            for j in size:
+                entry = self.dual.variable(matrix[i][j], {a: t[i][j] for a, t in enumerate(tangents)})
+                row.append(entry if entry.tangent else entry.value)
+            result.append(row)
+        return result
+
+    def _evaluator(self, X: Matrix, Xi: Matrix, Xd: Matrix, Xdi: Matrix) -> ExpressionEvaluator:
+        return ExpressionEvaluator(self.dual, self._values(X, Xi, Xd, Xdi))
+
+    def _values(self, X: Matrix, Xi: Matrix, Xd: Matrix, Xdi: Matrix) -> dict[sp.Symbol, Scalar]:
+        symbols = ErrorSymbols(self.real.group).matrices
+        values: dict[sp.Symbol, Scalar] = {}
+        for prefix, numbers in (("X", X), ("Xi", Xi), ("Xd", Xd), ("Xdi", Xdi)):
+            matrix = symbols[prefix]
+            for i, row in enumerate(numbers):
+                for j, entry in enumerate(row):
+                    if isinstance(matrix[i, j], sp.Symbol):
+                        values[matrix[i, j]] = entry
+        return values
+
+    def _transport(
+        self, group: GroupMatrices, X: Matrix, Xi: Matrix, Xd: Matrix, Xdi: Matrix, xi_d: Sequence[Scalar]
+    ) -> Vector:
+        if self.error.transport == "left":
+            return list(xi_d)
+        if self.error.transport == "right":
+            return group.Ad(matmul(Xi, Xd), matmul(Xdi, X), xi_d)
+        evaluate = ExpressionEvaluator(self.dual, self._values(X, Xi, Xd, Xdi))
+        if self.error.tau is not None:
+            tau = [[evaluate(entry) for entry in row] for row in self.error.tau.tolist()]
+            return group.Ad(tau, group.inverse(tau), xi_d)
+        rows = self.error.P.tolist() if self.error.P is not None else []
+        return matvec([[evaluate(entry) for entry in row] for row in rows], xi_d)

@@ -1,0 +1,171 @@
+"""Reference trajectories as kernels: t -> (X_d, xi_d, xi_d_dot), and the waypoints' quintics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.control.reference import TIME, FormulaReference, Reference, WaypointReference, formula_reference
+from lie_codegen.control.waypoints import waypoint_reference
+from lie_codegen.errors import InputError
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
+from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.wei_norman.body import WeiNormanData, body_velocity, product_exp
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
+from lie_codegen.kernel.expressions import ExpressionEvaluator
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import Matrix, Vector, matvec
+
+
+def reference_kernel(reference: Reference, name: str = "reference") -> Kernel:
+    """The kernel t -> (X_d, xi_d, xi_d_dot)."""
+    group = reference.group
+    evaluate = ReferenceBody(reference)
+
+    def body(ops: Arithmetic, t: Scalar) -> tuple[Any, ...]:
+        return evaluate(ops, t)
+
+    return Kernel(
+        name=name,
+        namespace=group.name,
+        inputs=(Port("t", (), "s"),),
+        outputs=(
+            matrix_port(group, "X_d", "reference configuration"),
+            Port("xi_d", (group.dim,), velocity_units(group), description="X_d' = X_d hat(xi_d)"),
+            Port("xi_d_dot", (group.dim,), velocity_units(group, "s^2")),
+        ),
+        body=body,
+        formula="X_d = X_0 exp(g_1 A_1) ... exp(g_n A_n), xi_d = M(g)^-1 g'"
+        if isinstance(reference, FormulaReference)
+        else "X_d = X_i exp(p_i(s)), p_i quintic",
+        source="Wei and Norman, Proc. AMS 15 (1964) 327",
+        sampler=lambda rng: (rng.uniform(0, 1),),
+    )
+
+
+class ReferenceBody:
+    """(ops, t) -> (X_d, xi_d, xi_d_dot), the matrix in the port's form."""
+
+    def __init__(self, reference: Reference) -> None:
+        self.reference = reference
+        self.derivation = GroupDerivation(reference.group)
+        self.data = WeiNormanData(reference.group)
+
+    def __call__(self, ops: Arithmetic, t: Scalar) -> tuple[Any, Vector, Vector]:
+        if isinstance(self.reference, FormulaReference):
+            return self._formulas(ops, t, self.reference)
+        return self._waypoints(ops, t, self.reference)
+
+    def _formulas(self, ops: Arithmetic, t: Scalar, reference: FormulaReference) -> tuple[Any, Vector, Vector]:
+        evaluate = ExpressionEvaluator(ops, {TIME: t})
+        g, rate, turn = ([evaluate(e) for e in row] for row in (reference.g, reference.rates, reference.accelerations))
+        dual = DualArithmetic(ops)
+        moving = [_variable(dual, a, b) for a, b in zip(g, rate, strict=True)]
+        velocity = [_variable(dual, a, b) for a, b in zip(rate, turn, strict=True)]
+        xi = body_velocity(dual, self.data, moving, velocity)
+        X = _from_left(ops, reference.start, product_exp(ops, self.data, g))
+        return X, [value_of(x, dual.level) for x in xi], [tangent_of(x, 0, dual.level) for x in xi]
+
+    def _waypoints(self, ops: Arithmetic, t: Scalar, reference: WaypointReference) -> tuple[Any, Vector, Vector]:
+        start, span, table, element = _segment(ops, t, reference)
+        s = (t - start) / span
+        inside = ops.where(ops.less(s, 0), 0, ops.where(ops.less(1, s), 1, s))
+        p = [_horner(row, inside, 0) for row in table]
+        v = [_horner(row, inside, 1) / span for row in table]
+        a = [_horner(row, inside, 2) / (span * span) for row in table]
+        dual = DualArithmetic(ops)
+        moving = [_variable(dual, x, y) for x, y in zip(p, v, strict=True)]
+        velocity = [_variable(dual, x, y) for x, y in zip(v, a, strict=True)]
+        xi = matvec(jacobian(dual, self.derivation, moving, "right", inverse=False), velocity)
+        X = _times(element, exp_matrix(ops, self.derivation, p))
+        return X, [value_of(x, dual.level) for x in xi], [tangent_of(x, 0, dual.level) for x in xi]
+
+
+def _variable(dual: DualArithmetic, value: Scalar, rate: Scalar) -> Scalar:
+    variable = dual.variable(value, {0: rate})
+    return variable if variable.tangent else variable.value
+
+
+def _horner(coefficients: Sequence[Scalar], s: Scalar, derivative: int) -> Scalar:
+    """A polynomial or its first or second derivative at s; coefficients from the constant up."""
+    terms = list(coefficients)
+    for _ in range(derivative):
+        terms = [k * c for k, c in enumerate(terms)][1:]
+    value: Scalar = 0
+    for c in reversed(terms):
+        value = value * s + c
+    return value
+
+
+def _segment(
+    ops: Arithmetic, t: Scalar, reference: WaypointReference
+) -> tuple[Scalar, Scalar, list[Vector], list[list[Any]]]:
+    """Start, duration, (n, 6) coefficients and first waypoint of the segment that holds t."""
+    starts, n = reference.times[:-1], reference.group.dim
+    later = [ops.less(float(start), t) for start in starts[1:]]
+
+    def chosen(values: NDArray[Any]) -> Scalar:
+        result: Scalar = float(values[0])
+        for condition, value in zip(later, values[1:], strict=True):
+            if any(other != values[0] for other in values):
+                result = ops.where(condition, float(value), result)
+        return result
+
+    spans = np.diff(reference.times)
+    table = [[chosen(reference.coefficients[:, m, k]) for m in range(6)] for k in range(n)]
+    X = reference.elements[:-1]
+    size = range(reference.group.degree)
+    if reference.group.is_complex:
+        element = [[Complex(chosen(X[:, i, j].real), chosen(X[:, i, j].imag)) for j in size] for i in size]
+    else:
+        element = [[chosen(X[:, i, j]) for j in size] for i in size]
+    return chosen(starts), chosen(spans), table, element
+
+
+def _from_left(ops: Arithmetic, start: NDArray[Any] | None, X: Matrix) -> Any:
+    if start is None:
+        return X
+    left = [
+        [Complex(float(z.real), float(z.imag)) if np.iscomplexobj(start) else float(z) for z in row] for row in start
+    ]
+    return _times(left, X)
+
+
+def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
+    size = len(a)
+    return [
+        [sum((a[i][k] * b[k][j] for k in range(1, size)), a[i][0] * b[0][j]) for j in range(size)] for i in range(size)
+    ]
+
+
+def reference(
+    group: MatrixGroup,
+    formulas: Sequence[Any] | None = None,
+    *,
+    times: ArrayLike | None = None,
+    waypoints: ArrayLike | None = None,
+    start: Any = None,
+) -> Reference:
+    """A reference from formulas of t, or from waypoints; its velocity and acceleration are derived.
+
+    Args:
+        group: the group.
+        formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n).
+        times, waypoints: (k,) and (k, d, d), instead of formulas.
+        start: (d, d) for formulas.
+
+    Raises:
+        InputError: both or neither given; else as `formula_reference` and `waypoint_reference`.
+    """
+    if (formulas is None) == (times is None or waypoints is None):
+        raise InputError(f"a reference on {group.name} is given by formulas, or by times and waypoints")
+    if formulas is not None:
+        return formula_reference(group, formulas, start=start)
+    return waypoint_reference(group, np.asarray(times), np.asarray(waypoints))

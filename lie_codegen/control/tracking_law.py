@@ -1,0 +1,202 @@
+"""Tracking laws on any matrix group, from an error function, a transport map and an inertia.
+
+    f = f_P + f_D + f_FF,  f_P,a = -d_1 phi_a,  f_D = -K_d (xi - nu),  nu = P(X, X_d) xi_d        (28)
+    W = phi + <I xi_e, xi_e>/2,  xi_e = xi - nu,  dW/dt = -<K_d xi_e, xi_e>  along I xi' = ad*_xi I xi + f
+
+with the feedforward by name (all share dW/dt and give different trajectories):
+
+    basic        -ad*_nu I xi + I nu'                    (29) with S = 0; printed without the I before xi
+    right        -ad*_xi I nu + I (nu' + [xi, nu])       f_FF,r of section 5.4: (29) with 2 S_tau
+    left         the same as basic; with nu = xi_d it is f_FF,l of section 5.4
+    levi_civita  I (nabla_xi nu + nu')                   Theorem 4.2
+
+Bullo and Murray, CIT-CDS 97-003, sections 4 and 5.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.control.compatibility import check_compatibility
+from lie_codegen.control.error_catalogue import catalogue_error, error_names, gain
+from lie_codegen.control.error_derivatives import ErrorDerivatives
+from lie_codegen.control.error_function import ErrorFunction, error_function
+from lie_codegen.errors import InputError
+from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
+from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.groups.units import force_units
+from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import (
+    Vector,
+    ad_star,
+    bracket,
+    constant_matrix,
+    dot,
+    matvec,
+    minus,
+    negative,
+    plus,
+    scaled,
+)
+
+#: The feedforwards by name.
+FEEDFORWARDS = ("basic", "right", "left", "levi_civita")
+
+
+def tracking_law(
+    group: MatrixGroup,
+    *,
+    inertia: Any,
+    error: Any,
+    gains: Mapping[str, Any] | None = None,
+    feedforward: str = "basic",
+    name: str = "tracking_law",
+) -> Kernel:
+    """The tracking law as a kernel (X, xi, X_d, xi_d, xi_d_dot) -> (force, phi, W, W_dot).
+
+    Args:
+        group: any matrix group.
+        inertia: symmetric positive definite on the algebra: a number, a diagonal or an (n, n) matrix.
+        error: a name ("so3_right", "so3_left", "se3_1" .. "se3_6", "frobenius"), an `ErrorFunction`, or (phi,
+        transport)
+            as `error_function` takes them, with the parameters among the gains.
+        gains: K_d (dissipation) and what the error function needs: K_p, or K_1 and K_2, or its parameters.
+        feedforward: "basic", "right", "left" or "levi_civita".
+        name: C identifier of the kernel.
+
+    Raises:
+        InputError: an indefinite inertia or gain, a name that is not known, a gain that is missing.
+        IncompatibleError: phi and the transport map do not satisfy (A2); with the residual.
+    """
+    require_group(group, "tracking_law")
+    if feedforward not in FEEDFORWARDS:
+        raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
+    if gains is not None and not isinstance(gains, Mapping):
+        raise InputError(f"gains must be a mapping such as {{'K_p': 4, 'K_d': 6}}, got {gains!r}")
+    gains = gains or {}
+    pair = as_error(group, error, gains)
+    metric = _inertia(group, inertia)
+    K_d = positive_matrix(gain(gains, "K_d", "a tracking law"), group.dim, "K_d")
+    check_compatibility(pair)
+    real, data = RealMatrices(group), WeiNormanData(group)
+
+    def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any) -> tuple[Any, ...]:
+        read = GroupMatrices(ops, real).read
+        return _law(ops, pair, real, metric, K_d, feedforward, read(X), xi, read(X_d), xi_d, xi_d_dot)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        def vector() -> list[float]:
+            return [rng.uniform(-1, 1) for _ in range(group.dim)]
+
+        return (random_element(group, data, rng), vector(), random_element(group, data, rng), vector(), vector())
+
+    n, speed = group.dim, velocity_units(group)
+    return Kernel(
+        name=name,
+        namespace=group.name,
+        inputs=(
+            matrix_port(group, "X", "configuration, body to inertial"),
+            Port("xi", (n,), speed, description="body velocity, X' = X hat(xi)"),
+            matrix_port(group, "X_d", "reference configuration"),
+            Port("xi_d", (n,), speed, description="reference velocity in the frame of the reference"),
+            Port("xi_d_dot", (n,), velocity_units(group, "s^2"), description="its rate of change"),
+        ),
+        outputs=(
+            Port("force", (n,), force_units(group), description="body force f of I xi' = ad*_xi I xi + f"),
+            Port("phi", (), "J", description="configuration error"),
+            Port("W", (), "J", description="total error energy, phi + <I xi_e, xi_e>/2"),
+            Port("W_dot", (), "W", description="dW/dt = -<K_d xi_e, xi_e>"),
+        ),
+        body=body,
+        formula=f"f = -d_1 phi - K_d (xi - nu) + f_FF; error {pair.name}, feedforward {feedforward}",
+        source="Bullo and Murray, CIT-CDS 97-003, (28), (29), Theorem 4.2",
+        sampler=sampler,
+    )
+
+
+def as_error(group: MatrixGroup, error: Any, gains: Mapping[str, Any]) -> ErrorFunction:
+    """An `ErrorFunction` from what `tracking_law` accepts.
+
+    Raises:
+        InputError: none of these, or a pair of another group.
+    """
+    if isinstance(error, ErrorFunction):
+        if error.group != group:
+            raise InputError(f"the error function {error.name} is one of {error.group.name}, not of {group.name}")
+        return error
+    if isinstance(error, str):
+        return catalogue_error(group, error, gains)
+    if isinstance(error, tuple | list) and len(error) == 2:
+        parameters = {key: value for key, value in gains.items() if key.replace("_", "").lower() != "kd"}
+        return error_function(group, error[0], error[1], parameters=parameters)
+    raise InputError(
+        f"error must be one of {', '.join(error_names(group))}, an ErrorFunction or (phi, transport), got {error!r}"
+    )
+
+
+def _inertia(group: MatrixGroup, inertia: Any) -> sp.ImmutableMatrix:
+    rotations = group.degree == 3 and "so3_right" in error_names(group)
+    return body_inertia(inertia) if rotations else positive_matrix(inertia, group.dim, "inertia")
+
+
+def _law(
+    ops: Arithmetic,
+    pair: ErrorFunction,
+    real: RealMatrices,
+    inertia: sp.ImmutableMatrix,
+    dissipation: sp.ImmutableMatrix,
+    feedforward: str,
+    X: Any,
+    xi: Sequence[Scalar],
+    X_d: Any,
+    xi_d: Sequence[Scalar],
+    xi_d_dot: Sequence[Scalar],
+) -> tuple[Any, ...]:
+    at = ErrorDerivatives(ops, pair, real, X, X_d)
+    phi, slope = at.differential(1)
+    nu, nu_dot, turned = at.transported_rates(xi, xi_d, xi_d_dot)
+    metric = constant_matrix(ops, inertia)
+    xi_e = minus(xi, nu)
+    damping = matvec(constant_matrix(ops, dissipation), xi_e)
+    forward = _feedforward(ops, real, inertia, feedforward, xi, nu, nu_dot, turned)
+    force = plus(negative(slope), negative(damping), forward)
+    energy = phi + dot(matvec(metric, xi_e), xi_e) / 2
+    return force, phi, energy, -dot(damping, xi_e)
+
+
+def _feedforward(
+    ops: Arithmetic,
+    real: RealMatrices,
+    inertia: sp.ImmutableMatrix,
+    kind: str,
+    xi: Sequence[Scalar],
+    nu: Vector,
+    nu_dot: Vector,
+    turned: Vector,
+) -> Vector:
+    algebra = real.group.algebra
+    metric = constant_matrix(ops, inertia)
+    if kind == "right":
+        return minus(matvec(metric, turned), ad_star(ops, algebra, xi, matvec(metric, nu)))
+    if kind == "levi_civita":
+        return plus(matvec(metric, nu_dot), lowered_connection(ops, real, inertia, xi, nu))
+    return minus(matvec(metric, nu_dot), ad_star(ops, algebra, nu, matvec(metric, xi)))
+
+
+def lowered_connection(
+    ops: Arithmetic, real: RealMatrices, inertia: sp.ImmutableMatrix, x: Sequence[Scalar], y: Sequence[Scalar]
+) -> Vector:
+    """I nabla_x y = I [x, y]/2 - (ad*_x I y + ad*_y I x)/2, (8); no inverse of I is needed."""
+    algebra = real.group.algebra
+    metric = constant_matrix(ops, inertia)
+    half = ops.constant(sp.Rational(1, 2))
+    symmetric = plus(ad_star(ops, algebra, x, matvec(metric, y)), ad_star(ops, algebra, y, matvec(metric, x)))
+    return scaled(half, minus(matvec(metric, bracket(ops, algebra, x, y)), symmetric))

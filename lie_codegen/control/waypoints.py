@@ -1,0 +1,131 @@
+"""Waypoints on a group joined by quintics of the algebra, twice continuously differentiable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.control.reference import WaypointReference
+from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
+from lie_codegen.groups.maps.logarithm import log_coordinates
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.arithmetic import FloatArithmetic
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.dual import Dual, DualArithmetic, tangent_of
+from lie_codegen.kernel.linear import matvec
+
+#: How far a waypoint may lie off the group, relative to its size.
+_ON_GROUP = 1e-8
+
+
+def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLike) -> WaypointReference:
+    """A twice continuously differentiable curve through the waypoints, at rest at both ends.
+
+    At an inner waypoint its velocity is the mean of the constant velocities of the two segments that meet there,
+    weighted by the other's duration, and its acceleration is zero.
+
+    Args:
+        group: the group.
+        times: (k,) increasing [s], k >= 2.
+        waypoints: (k, d, d) elements.
+
+    Raises:
+        ShapeError: the shapes do not fit.
+        InputError: times that do not increase (a jump), or two waypoints whose relative element has no unique
+        logarithm. NotOnGroupError: a waypoint is off the group.
+    """
+    t = np.asarray(times, dtype=float)
+    X = np.asarray(waypoints, dtype=complex if group.is_complex else float)
+    if t.ndim != 1 or len(t) < 2 or X.shape != (len(t), group.degree, group.degree):
+        raise ShapeError(
+            f"waypoints on {group.name}: times {t.shape} and elements {X.shape}; give (k,) and "
+            f"(k, {group.degree}, {group.degree}) with k >= 2"
+        )
+    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(X))):
+        raise InputError("waypoints hold NaN or infinity")
+    bad = np.flatnonzero(np.diff(t) <= 0)
+    if len(bad):
+        raise InputError(
+            f"the reference jumps: waypoint {bad[0] + 2} at t = {t[bad[0] + 1]:g} does not come after waypoint "
+            f"{bad[0] + 1} at t = {t[bad[0]]:g}; times must increase"
+        )
+    moves = np.array([_relative_log(group, X[i], X[i + 1], i) for i in range(len(t) - 1)])
+    spans = np.diff(t)
+    mean = moves / spans[:, None]
+    speed = np.zeros((len(t), group.dim))
+    weight = spans[1:] / (spans[1:] + spans[:-1])
+    speed[1:-1] = weight[:, None] * mean[:-1] + (1 - weight)[:, None] * mean[1:]
+    derivation = GroupDerivation(group)
+    table = [_quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
+    return WaypointReference(group, t, X, np.array(table))
+
+
+def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: int) -> NDArray[Any]:
+    relative = np.linalg.solve(X, Y)
+    x = _logarithm(group, relative)
+    if x is not None:
+        return x
+    for number, element in ((index + 1, X), (index + 2, Y)):
+        if not _on_group(group, element):
+            raise NotOnGroupError(f"waypoint {number} is not on {group.name}, or too far from its identity")
+    raise InputError(
+        f"between waypoints {index + 1} and {index + 2} there is no unique way (their relative element has no "
+        "principal logarithm, as a turn by 180 degrees has none); put a waypoint between them"
+    )
+
+
+def _logarithm(group: MatrixGroup, X: NDArray[Any]) -> NDArray[Any] | None:
+    """The x with exp(hat(x)) = X, or None where the principal logarithm is not in the algebra."""
+    derivation, ops = GroupDerivation(group), FloatArithmetic()
+    try:
+        x = np.array(log_coordinates(ops, derivation, _scalars(X)), dtype=float)
+        off = float(np.max(np.abs(_numbers(exp_matrix(ops, derivation, x.tolist())) - X)))
+    except (ArithmeticError, ValueError):
+        return None
+    turn = float(np.max(np.abs(np.linalg.eigvals(group.hat(x)).imag)))
+    if turn > np.pi * (1 - 1e-9):
+        return None  # the other way round is as short
+    return x if off <= _ON_GROUP * max(1.0, float(np.max(np.abs(X)))) else None
+
+
+def _scalars(X: NDArray[Any]) -> list[list[Any]]:
+    if np.iscomplexobj(X):
+        return [[Complex(float(z.real), float(z.imag)) for z in row] for row in X]
+    return [[float(x) for x in row] for row in X]
+
+
+def _numbers(X: Sequence[Sequence[Any]]) -> NDArray[Any]:
+    return np.array([[complex(z.re, z.im) if isinstance(z, Complex) else float(z) for z in row] for row in X])
+
+
+def _on_group(group: MatrixGroup, X: NDArray[Any]) -> bool:
+    """Whether X is on the group: some element near it has a logarithm in the algebra."""
+    derivation, ops = GroupDerivation(group), FloatArithmetic()
+    for seed in range(3):
+        small = 0.1 * np.random.default_rng(seed).normal(size=group.dim)
+        nudge = _numbers(exp_matrix(ops, derivation, small.tolist()))
+        if _logarithm(group, X @ nudge) is not None:
+            return True
+    return False
+
+
+def _quintic(
+    derivation: GroupDerivation, move: NDArray[Any], first: NDArray[Any], last: NDArray[Any], span: float
+) -> NDArray[Any]:
+    """(6, n): p(0) = 0, p(1) = move, body velocities first and last [1/s] and no body acceleration at either end."""
+    ops = FloatArithmetic()
+    inverse = np.array(jacobian(ops, derivation, [float(x) for x in move], "right", inverse=True), dtype=float)
+    rate = inverse @ last * span
+    dual = DualArithmetic(ops)
+    moving = [dual.variable(float(a), {0: float(b)}) for a, b in zip(move, rate, strict=True)]
+    turning = matvec(jacobian(dual, derivation, moving, "right", inverse=False), [float(r) for r in rate])
+    bend = -inverse @ np.array([float(tangent_of(x)) if isinstance(x, Dual) else 0.0 for x in turning])
+    start = first * span
+    conditions = np.array([[1, 1, 1], [3, 4, 5], [6, 12, 20]], dtype=float)
+    rest = np.linalg.solve(conditions, np.array([move - start, rate - start, bend]))
+    return np.vstack([np.zeros_like(move), start, np.zeros_like(move), rest])

@@ -1,0 +1,146 @@
+"""The closed grammar in which users write numbers and formulas.
+
+    expression := term (('+' | '-') term)*
+    term       := factor (('*' | '/') factor)*
+    factor     := ('+' | '-') factor | power
+    power      := atom (('^' | '**') factor)?
+    atom       := number | name | function '(' expression (',' expression)* ')' | '(' expression ')'
+
+Numbers are integers and decimals, taken exactly ("0.1" is 1/10). Names and functions are those the caller
+allows, nothing else: a text is data and is never evaluated as Python nor given to SymPy's parser.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import sympy as sp
+
+from lie_codegen.errors import ExpressionError
+from lie_codegen.exact.token_stream import Token, TokenStream
+
+_MAX_EXPONENT = 64
+
+Function = Callable[..., sp.Expr]
+
+#: What an entry of a matrix or a structure constant may hold beside numbers.
+NUMBER_NAMES: Mapping[str, sp.Expr] = {"pi": sp.pi, "I": sp.I, "i": sp.I}
+NUMBER_FUNCTIONS: Mapping[str, Function] = {"sqrt": sp.sqrt}
+#: What a formula of an input, a Lagrangian or a perturbation may call.
+FORMULA_FUNCTIONS: Mapping[str, Function] = {
+    "sqrt": sp.sqrt, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "exp": sp.exp, "log": sp.log, "asin": sp.asin,
+    "acos": sp.acos, "atan": sp.atan, "atan2": sp.atan2, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
+    "abs": sp.Abs,
+}  # fmt: skip
+
+
+def parse_number(text: str) -> sp.Expr:
+    """The exact number a text denotes: rationals, decimals, sqrt, pi, and I (or i) for the imaginary unit.
+
+    Raises:
+        ExpressionError: for anything else, with the column (counted from 1).
+    """
+    value = parse_expression(text, NUMBER_NAMES, NUMBER_FUNCTIONS)
+    return sp.expand(value)
+
+
+def parse_expression(text: str, names: Mapping[str, sp.Expr], functions: Mapping[str, Function]) -> sp.Expr:
+    """The SymPy expression a text denotes, built from the given names and functions only.
+
+    Raises:
+        ExpressionError: for a text outside the grammar, with the column (counted from 1).
+    """
+    return _Parser(text, names, functions).parse()
+
+
+class _Parser(TokenStream):
+    """Recursive descent; one instance a text."""
+
+    def __init__(self, text: str, names: Mapping[str, sp.Expr], functions: Mapping[str, Function]) -> None:
+        super().__init__(text, ",")
+        self.names = names
+        self.functions = functions
+
+    def parse(self) -> sp.Expr:
+        if self.token.kind == "end":
+            raise ExpressionError("column 1: the text is empty")
+        value = self.expression()
+        self.end()
+        return value
+
+    def expression(self) -> sp.Expr:
+        self.deeper()
+        value = self.term()
+        while operator := self.accept("+", "-"):
+            value = value + self.term() if operator == "+" else value - self.term()
+        self.depth -= 1
+        return value
+
+    def term(self) -> sp.Expr:
+        value = self.factor()
+        while operator := self.accept("*", "/"):
+            token = self.token
+            other = self.factor()
+            if operator == "/" and other.is_zero:
+                raise self.error("division by zero", token)
+            value = value * other if operator == "*" else value / other
+        return value
+
+    def factor(self) -> sp.Expr:
+        sign = 1
+        while operator := self.accept("+", "-"):
+            sign = -sign if operator == "-" else sign
+        return sign * self.power()
+
+    def power(self) -> sp.Expr:
+        base = self.atom()
+        if self.accept("^", "**") is None:
+            return base
+        token = self.token
+        self.deeper()
+        exponent = self.factor()
+        self.depth -= 1
+        if not (exponent.is_Integer and abs(exponent) <= _MAX_EXPONENT):
+            raise self.error(f"an exponent must be an integer between -{_MAX_EXPONENT} and {_MAX_EXPONENT}", token)
+        if exponent < 0 and base.is_zero:
+            raise self.error("division by zero", token)
+        return base**exponent
+
+    def atom(self) -> sp.Expr:
+        token = self.token
+        if token.kind == "number":
+            self.index += 1
+            return self.number(token)
+        if token.kind == "name":
+            self.index += 1
+            return self.name(token)
+        if self.accept("("):
+            value = self.expression()
+            self.expect(")")
+            return value
+        raise self.error("the text ends too soon" if token.kind == "end" else f"{token.text!r} is not expected here")
+
+    def name(self, token: Token) -> sp.Expr:
+        if self.accept("("):
+            function = self.functions.get(token.text)
+            if function is None:
+                known = ", ".join(sorted(self.functions)) or "none"
+                raise self.error(f"no function {token.text!r}; known: {known}", token)
+            return self.call(token, function)
+        if token.text in self.names:
+            return self.names[token.text]
+        known = ", ".join(sorted(self.names)) or "none"
+        raise self.error(f"no name {token.text!r}; known: {known}", token)
+
+    def call(self, token: Token, function: Function) -> sp.Expr:
+        arguments = [self.expression()]
+        while self.accept(","):
+            arguments.append(self.expression())
+        self.expect(")")
+        expected = 2 if token.text == "atan2" else 1
+        if len(arguments) != expected:
+            raise self.error(f"{token.text} takes {expected} argument(s), {len(arguments)} given", token)
+        value = function(*arguments)
+        if value.has(sp.zoo, sp.nan, sp.oo, -sp.oo):
+            raise self.error(f"{token.text} has no finite value there", token)
+        return value

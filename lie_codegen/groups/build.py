@@ -1,0 +1,157 @@
+"""lc.build and lc.generate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from lie_codegen.errors import InputError
+from lie_codegen.groups.group_library import GroupLibrary, group_library
+from lie_codegen.runtime.build import build_kernels
+from lie_codegen.runtime.library import Library, require_kernels
+
+if TYPE_CHECKING:
+    from lie_codegen.groups.matrix_group import MatrixGroup
+    from lie_codegen.kernel.kernel import Kernel
+
+    Buildable = MatrixGroup | Kernel | Sequence[Kernel] | str | Path
+
+
+#: What `generate(steering=)` adds is written by a floor above this one, named here and loaded when asked for.
+STEERING_PACKAGE = ("lie_codegen.steering.shooting.package", "render_steering_package")
+
+
+def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = ()) -> Library:
+    """Compiled kernels, from the cache where they are there.
+
+    The kernels of a group are derived and compiled one by one, each when it is first asked for; a list of Kernels is
+    compiled at once.
+
+    Args:
+        what: a group (all its kernels), a catalogue name or the path of a group file (the same, without importing SymPy
+            when the cache has it, or the package brings the C sources), a Kernel, or several Kernels of one namespace.
+        kernels: names to have compiled before this returns, side by side on the processor's cores; "all" for every one.
+
+    Raises:
+        InputError: if it is none of these, kernels of several namespaces or with repeated names are given, or `kernels`
+            names one that there is not.
+        CompileError: with the command and the compiler's own words; for a group when the kernel is asked for.
+    """
+    if isinstance(what, str | Path):
+        library = _build_named(what)
+    else:
+        group, given = _group_or_kernels(what)
+        if group is None:
+            namespace = _namespace(given)
+            whole = build_kernels(lambda: given, namespace=namespace, definition=None)
+            require_kernels(whole, () if kernels == "all" else kernels)
+            return whole
+        library = group_library(object_definition(group), lambda: group)
+    library.compile(library.kernels if kernels == "all" else kernels)
+    return library
+
+
+def generate(
+    what: Buildable,
+    folder: str | Path,
+    *,
+    steering: Sequence[str | int] | Literal[True] | None = None,
+    real: str = "double",
+) -> Path:
+    """The C package of a group or of kernels, written as a folder; returns its path.
+
+    Args:
+        what: as `build`.
+        folder: created if need be.
+        steering: controls of a group, for a minimum-energy steering solver in the subfolder "steering", a C package by
+            itself with its own example and test vectors; True for all components. The solver is in double.
+        real: "double", or "float" for processors without double: arguments, constants and libm in single precision.
+
+    Raises:
+        InputError: as `build`; steering of kernels.
+        UncontrollableError: the controls of `steering` do not reach everything; says what is missing.
+        OutputFolderError: the folder cannot be written, or holds files that are not ours.
+    """
+    from lie_codegen.codegen.generate import generate as generate_package
+    from lie_codegen.codegen.views import PackageMetadata
+
+    if isinstance(what, str | Path):
+        from lie_codegen.groups.catalogue_load import group as load
+
+        what = load(what)
+    group, kernels = _group_or_kernels(what)
+    if group is None:
+        if steering is not None:
+            raise InputError("generate: steering needs a group, not kernels")
+        return generate_package(kernels, folder, namespace=_namespace(kernels), real=real)
+    extra = _steering(group, steering) if steering is not None else {}
+    metadata = PackageMetadata(title=group.name, description=_about(group), labels=group.labels, units=group.units)
+    return generate_package(_kernels_of(group), folder, namespace=group.name, metadata=metadata, extra=extra, real=real)
+
+
+def _steering(group: MatrixGroup, controls: Sequence[str | int] | Literal[True]) -> dict[str, str]:
+    module, function = STEERING_PACKAGE
+    render = getattr(import_module(module), function)
+    files: dict[str, str] = render(group, group.labels if controls is True else controls, folder="steering")
+    return files
+
+
+def _about(group: MatrixGroup) -> str:
+    """The description and the matrices: a representation found from brackets is nowhere else to be read."""
+    basis = zip(group.labels, group.exact_basis, strict=True)
+    rows = [f"{label} = [{'; '.join(' '.join(map(str, row)) for row in matrix.tolist())}]" for label, matrix in basis]
+    return "\n".join([line for line in (group.description,) if line] + ["Basis, row by row:", *rows])
+
+
+def source_definition(source: bytes) -> str:
+    """What `build` knows a name or a group file by."""
+    return f"file\n{source.decode('utf-8', errors='replace')}"
+
+
+def object_definition(group: MatrixGroup) -> str:
+    """What `build` knows a group by."""
+    return f"group\n{group.definition}"
+
+
+def _build_named(what: str | Path) -> GroupLibrary:
+    from lie_codegen.groups.catalogue_names import definition_source
+
+    source = definition_source(what)
+
+    def load() -> MatrixGroup:
+        from lie_codegen.groups.catalogue_load import group_of_source
+
+        return group_of_source(what, source)
+
+    return group_library(source_definition(source), load)
+
+
+def _kernels_of(group: MatrixGroup) -> tuple[Kernel, ...]:
+    from lie_codegen.groups.kernels import group_kernels
+
+    return group_kernels(group)
+
+
+def _group_or_kernels(what: Any) -> tuple[MatrixGroup | None, tuple[Kernel, ...]]:
+    from lie_codegen.groups.matrix_group import MatrixGroup
+    from lie_codegen.kernel.kernel import Kernel
+
+    if isinstance(what, MatrixGroup):
+        return what, ()
+    kernels = (what,) if isinstance(what, Kernel) else tuple(what) if isinstance(what, Sequence) else ()
+    if not kernels or not all(isinstance(kernel, Kernel) for kernel in kernels):
+        raise InputError(f"expected a group, its name or file, a Kernel or several Kernels, got {what!r}")
+    return None, kernels
+
+
+def _namespace(kernels: Sequence[Kernel]) -> str:
+    namespaces = sorted({kernel.namespace for kernel in kernels})
+    if len(namespaces) > 1:
+        raise InputError(f"kernels of several namespaces ({', '.join(namespaces)}): build each on its own")
+    names = [kernel.name for kernel in kernels]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InputError(f"kernel names repeated: {', '.join(repeated)}; rename one of each")
+    return namespaces[0]

@@ -1,0 +1,101 @@
+"""What the kernels of a group are made from, derived once, exactly, when first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import sympy as sp
+
+from lie_codegen.algebra.adjoint import ad, killing_form
+from lie_codegen.exact.block_structure import diagonal_blocks
+from lie_codegen.exact.even_spectrum import EvenSpectrum, even_spectrum
+from lie_codegen.exact.invariant_form import Relation, entry_relation, matrix_relation
+from lie_codegen.exact.spectral_pattern import ColumnPattern, spectral_pattern
+from lie_codegen.groups.maps.log_structure import LogStructure, log_structure
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.groups.wei_norman.body import WeiNormanData
+
+
+@dataclass(frozen=True)
+class GroupDerivation:
+    """Exact data of one group.
+
+    Attributes:
+        group: the group.
+    """
+
+    group: MatrixGroup
+
+    @cached_property
+    def real(self) -> RealMatrices:
+        """The group as real matrices; a complex X as [[Re X, -Im X], [Im X, Re X]]."""
+        return RealMatrices(self.group)
+
+    @cached_property
+    def wei_norman(self) -> WeiNormanData:
+        """exp(x ad_k) and exp(x A_k) of each basis element."""
+        return WeiNormanData(self.group)
+
+    @cached_property
+    def ads(self) -> tuple[sp.Matrix, ...]:
+        """(n) exact ad_k."""
+        return tuple(ad(self.group.algebra, k) for k in range(self.group.dim))
+
+    @cached_property
+    def matrix_pattern(self) -> tuple[ColumnPattern, ...] | None:
+        """Annihilating polynomials of hat(x), column by column; None where there are none of the closed kind."""
+        return spectral_pattern(self.real.basis)
+
+    @cached_property
+    def adjoint_pattern(self) -> tuple[ColumnPattern, ...] | None:
+        """Annihilating polynomials of ad x, column by column."""
+        return spectral_pattern(self.ads)
+
+    @cached_property
+    def log_structure(self) -> LogStructure | None:
+        """The blocks the logarithm is read from; None where one is of no known kind."""
+        return log_structure(self.group)
+
+    @cached_property
+    def section_pattern(self) -> tuple[ColumnPattern, ...] | None:
+        """Annihilating polynomials of ad x for the x that the blocks alone determine."""
+        structure = self.log_structure
+        pivots = structure.pivots if structure is not None else ()
+        zero = sp.zeros(self.group.dim, self.group.dim)
+        return spectral_pattern([self.ads[i] if i in pivots else zero for i in range(self.group.dim)])
+
+    @cached_property
+    def real_block_of(self) -> tuple[int, ...]:
+        """For each row of the real form, the number of its diagonal block in the group's own matrices."""
+        d = self.group.degree
+        place = {i: b for b, block in enumerate(diagonal_blocks(self.group.exact_basis)) for i in block}
+        return tuple(place[i % d] for i in range(self.real.size))
+
+    @cached_property
+    def matrix_spectrum(self) -> EvenSpectrum | None:
+        """Where the eigenvalues of hat(x) are +-lambda_i, equally often; None elsewhere and for complex matrices."""
+        return None if self.group.is_complex else even_spectrum(self.group.exact_basis)
+
+    @cached_property
+    def adjoint_spectrum(self) -> EvenSpectrum | None:
+        """The same of ad x."""
+        return even_spectrum(self.ads)
+
+    @cached_property
+    def is_unitary(self) -> bool:
+        """Whether the matrices of the group are complex and unitary."""
+        return self.group.is_complex and all(
+            (m + m.H).applyfunc(sp.expand).is_zero_matrix for m in self.group.exact_basis
+        )
+
+    @cached_property
+    def matrix_relation(self) -> Relation:
+        """Which entries of a function of hat(x) follow from others."""
+        return {} if self.group.is_complex else matrix_relation(self.group.exact_basis)
+
+    @cached_property
+    def adjoint_relation(self) -> Relation:
+        """Which entries of a function of ad x follow from others: by antisymmetry, else by the Killing form."""
+        return matrix_relation(self.ads) or entry_relation(killing_form(self.group.algebra))

@@ -1,0 +1,103 @@
+"""exp(x) = exp(hat(x)) and its Jacobians, in closed form where the spectrum allows it.
+
+    ljac(x) = sum_k ad_x^k / (k + 1)!,  rjac(x) = ljac(-x),  ljac(x) = Ad(exp x) rjac(x),
+    d/dt exp(x) = hat(ljac(x) x') exp(x) = exp(x) hat(rjac(x) x').
+
+Both sides of the second line are differenced in the tests. Closed forms: `matrix_function`; the rest: `spectral_functions`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.matrices import real_rows
+from lie_codegen.groups.maps.matrix_function import (
+    EXP,
+    LEFT_JACOBIAN,
+    LEFT_JACOBIAN_INVERSE,
+    RIGHT_JACOBIAN,
+    RIGHT_JACOBIAN_INVERSE,
+    FunctionOfMatrix,
+    LinearFamily,
+    MatrixFunction,
+)
+from lie_codegen.groups.maps.rkmk import hat_body
+from lie_codegen.groups.maps.spectral_functions import (
+    exponential,
+    inverse_jacobian_of_exp,
+    jacobian_of_exp,
+    plain_jacobian_of_exp,
+)
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.block_solve import is_zero, solve
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.linear import Matrix, Vector, bracket, dot, identity, number
+
+_FUNCTIONS: dict[tuple[str, bool], MatrixFunction] = {
+    ("left", False): LEFT_JACOBIAN,
+    ("right", False): RIGHT_JACOBIAN,
+    ("left", True): LEFT_JACOBIAN_INVERSE,
+    ("right", True): RIGHT_JACOBIAN_INVERSE,
+}
+
+
+def exp_matrix(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> list[list[Any]]:
+    """exp(hat(x)); Complex entries for a complex group."""
+    group = data.group
+    if data.matrix_pattern is None:
+        traceless = all(matrix.trace() == 0 for matrix in group.exact_basis)
+        A = hat_body(group, ops, x)
+        return exponential(
+            ops, A, data.matrix_spectrum, data.matrix_relation, unitary=data.is_unitary, traceless=traceless
+        )
+    d = group.degree
+    function = FunctionOfMatrix(LinearFamily(ops, data.real.basis, x), data.matrix_pattern, EXP)
+    columns = [function.column(j) for j in range(d)]
+    if not group.is_complex:
+        return [[column.get(i, 0) for column in columns] for i in range(d)]
+    return [[Complex(column.get(i, 0), column.get(i + d, 0)) for column in columns] for i in range(d)]
+
+
+def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: str, *, inverse: bool) -> Matrix:
+    """(n, n) ljac or rjac of x, or its inverse; singular where ad x has an eigenvalue 2 pi i k, k != 0."""
+    if data.adjoint_pattern is None and data.adjoint_spectrum is not None:
+        function = inverse_jacobian_of_exp if inverse else jacobian_of_exp
+        sign = 1 if side == "left" else -1
+        return function(ops, ad_body(ops, data, x), data.adjoint_spectrum, data.adjoint_relation, sign)
+    if data.adjoint_pattern is None:
+        return _plain(ops, data, x, 1 if side == "left" else -1, inverse=inverse)
+    family = LinearFamily(ops, data.ads, x)
+    closed = FunctionOfMatrix(family, data.adjoint_pattern, _FUNCTIONS[side, inverse])
+    n = data.group.dim
+    columns = [closed.column(j) for j in range(n)]
+    return [[column.get(i, 0) for column in columns] for i in range(n)]
+
+
+def ad_body(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> Matrix:
+    """(n, n) the matrix of ad x."""
+    columns = [bracket(ops, data.group.algebra, x, unit) for unit in identity(data.group.dim)]
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _plain(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], sign: int, *, inverse: bool) -> Matrix:
+    """The Jacobian modulo the characteristic polynomial of ad; its inverse by blocks."""
+    traceless = all(matrix.trace() == 0 for matrix in data.ads)
+    J = plain_jacobian_of_exp(ops, ad_body(ops, data, x), traceless=traceless, sign=sign)
+    if not inverse:
+        return J
+    n = data.group.dim
+    sparse = {(i, j): value for i, row in enumerate(J) for j, value in enumerate(row) if not is_zero(value)}
+    columns = solve(sparse, [{j: 1} for j in range(n)], n)
+    return [[column.get(i, 0) for column in columns] for i in range(n)]
+
+
+def coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
+    """The x with hat(x) = A, from as few entries as determine it; A real or Complex, in the algebra."""
+    return real_coordinates(ops, data, real_rows(A) if data.group.is_complex else A)
+
+
+def real_coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:
+    """The x with hat(x) = A, for A in its real form."""
+    return [dot([number(ops, c) for c in row.values()], [A[i][j] for i, j in row]) for row in data.real.coordinates]

@@ -1,0 +1,180 @@
+"""Runge-Kutta-Munthe-Kaas steps of X' = X hat(u(t)), and the same equation in Wei-Norman coordinates."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lie_codegen.groups.maps.short_exponential import short_pattern, times_short_exp
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp, rate
+from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernel.block_solve import add, is_zero, product
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.kernel import Body, Kernel, Port
+
+#: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
+TAYLOR_DEGREE = 12
+
+
+def bracket_body(group: MatrixGroup, ops: Arithmetic, x: Sequence[Scalar], y: Sequence[Scalar]) -> list[Scalar]:
+    """[x, y] from the structure constants."""
+    result: list[Scalar] = [0] * group.dim
+    for (i, j), row in group.algebra.table.items():
+        wedge = x[i] * y[j] - x[j] * y[i]
+        for k, value in row.items():
+            term = wedge if value == 1 else -wedge if value == -1 else ops.constant(value) * wedge
+            result[k] = add(result[k], term)
+    return result
+
+
+def rkmk4_increment(
+    group: MatrixGroup, ops: Arithmetic, u0: Sequence[Scalar], um: Sequence[Scalar], u1: Sequence[Scalar], h: Scalar
+) -> list[Scalar]:
+    """Theta with X(t + h) = X(t) exp(Theta) + O(h^5), from u at both ends and the middle of the step.
+
+    Theta' = dexpinv(u) = u + [Theta, u] / 2 + [Theta, [Theta, u]] / 12 - ..., signs for X' = X hat(u).
+    Munthe-Kaas, BIT 38 (1998) 92.
+    """
+
+    half, twelfth = ops.constant(Fraction(1, 2)), ops.constant(Fraction(1, 12))  # products are cheaper than quotients
+
+    def rate_at(theta: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
+        first = bracket_body(group, ops, theta, u)
+        second = bracket_body(group, ops, theta, first)
+        return [v + half * a + twelfth * b for v, a, b in zip(u, first, second, strict=True)]
+
+    k1 = list(u0)
+    k2 = rate_at([half * h * k for k in k1], um)
+    k3 = rate_at([half * h * k for k in k2], um)
+    k4 = rate_at([h * k for k in k3], u1)
+    return [h / 6 * (a + 2 * (b + c) + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+
+
+def times_taylor_exp(
+    group: MatrixGroup,
+    ops: Arithmetic,
+    X: Sequence[Sequence[Any]],
+    theta: Sequence[Scalar],
+    degree: int = TAYLOR_DEGREE,
+) -> Any:
+    """X exp(hat(theta)) by Horner's rule on the Taylor polynomial, X (I + A (I + A/2 (I + A/3 ...))), or the short form of it."""
+    size = group.degree
+    generator = hat_body(group, ops, theta)
+    pattern = short_pattern(group)
+    if pattern is not None and degree > pattern.zeros + 1:
+        return times_short_exp(ops, pattern, X, generator, theta, degree)
+    value: list[list[Any]] = [list(row) for row in X]
+    for order in range(degree, 0, -1):
+        factor = ops.constant(Fraction(1, order))
+        value = [
+            [
+                _moved(X[i][j], sum_products((value[i][m], generator[m][j]) for m in range(size)), factor)
+                for j in range(size)
+            ]
+            for i in range(size)
+        ]
+    return value
+
+
+def _moved(entry: Any, total: Any, factor: Scalar) -> Any:
+    return entry if is_zero(total) else entry + total * factor
+
+
+def hat_body(group: MatrixGroup, ops: Arithmetic, x: Sequence[Scalar]) -> list[list[Any]]:
+    """hat(x), row by row; plain zeros where every basis matrix has one."""
+    size = group.degree
+    result: list[list[Any]] = [[0] * size for _ in range(size)]
+    for component, matrix in zip(x, group.exact_basis, strict=True):
+        for i in range(size):
+            for j in range(size):
+                if matrix[i, j] != 0:
+                    re, im = matrix[i, j].as_real_imag()
+                    term: Any = product(_coefficient(ops, re), component)
+                    if group.is_complex:
+                        term = Complex(term, product(_coefficient(ops, im), component))
+                    result[i][j] = term if is_zero(result[i][j]) else result[i][j] + term
+    return result
+
+
+def _coefficient(ops: Arithmetic, value: Any) -> Scalar:
+    return int(value) if value.is_Integer else ops.constant(value)
+
+
+def sum_products(pairs: Any) -> Any:
+    """sum a b over pairs, plain zeros left out."""
+    total: Any = None
+    for a, b in pairs:
+        if isinstance(b, int) and b == 0:
+            continue
+        total = a * b if total is None else total + a * b
+    return 0 if total is None else total
+
+
+def rkmk4_step(group: MatrixGroup) -> Kernel:
+    """One step of X' = X hat(u): (X, u0, um, u1, h) -> X_next, for `scan`.
+
+    u0, um, u1 are u at t, t + h/2, t + h; exact on the group, global error O(h^4); |h u| <= 1/4 keeps the
+    exponential exact to rounding.
+    """
+
+    def body(ops: Arithmetic, X: Any, u0: Any, um: Any, u1: Any, h: Any) -> tuple[Any, ...]:
+        return (times_taylor_exp(group, ops, X, rkmk4_increment(group, ops, u0, um, u1, h)),)
+
+    formula = "X_next = X exp(Theta), Theta by one RKMK4 step of Theta' = dexpinv(u)"
+    return flow_step(group, "rkmk4_step", body, formula, "Munthe-Kaas, BIT 38 (1998) 92")
+
+
+def flow_step(group: MatrixGroup, name: str, body: Body, formula: str, source: str) -> Kernel:
+    """The kernel of a step (X, u0, um, u1, h) -> X_next of X' = X hat(u), u at t, t + h/2 and t + h."""
+    n, d = group.dim, group.degree
+    data = WeiNormanData(group)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        X = product_exp(FloatArithmetic(), data, [rng.uniform(-1, 1) for _ in range(n)])
+        return (X, *([rng.uniform(-1, 1) for _ in range(n)] for _ in range(3)), rng.uniform(0, 0.1))
+
+    return Kernel(
+        name=name,
+        namespace=group.name,
+        inputs=(
+            Port("X", (d, d), is_complex=group.is_complex),
+            *(Port(each, (n,)) for each in ("u0", "um", "u1")),
+            Port("h", (), "s"),
+        ),
+        outputs=(Port("X_next", (d, d), is_complex=group.is_complex),),
+        body=body,
+        formula=formula,
+        source=source,
+        sampler=sampler,
+    )
+
+
+def wei_norman_step(group: MatrixGroup) -> Kernel:
+    """One classical RK4 step of g' = M(g) u: (g, u0, um, u1, h) -> g_next, for `scan`."""
+    n = group.dim
+    data = WeiNormanData(group)
+
+    def body(ops: Arithmetic, g: Any, u0: Any, um: Any, u1: Any, h: Any) -> tuple[Any, ...]:
+        def moved(k: Sequence[Scalar], factor: Scalar) -> list[Scalar]:
+            return [a + factor * b for a, b in zip(g, k, strict=True)]
+
+        half, sixth = h * 0.5, h * (1 / 6)
+        k1 = rate(ops, data, g, u0)
+        k2 = rate(ops, data, moved(k1, half), um)
+        k3 = rate(ops, data, moved(k2, half), um)
+        k4 = rate(ops, data, moved(k3, h), u1)
+        return ([x + sixth * (a + 2 * (b + c) + e) for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
+
+    return Kernel(
+        name="wei_norman_step",
+        namespace=group.name,
+        inputs=(Port("g", (n,)), *(Port(name, (n,)) for name in ("u0", "um", "u1")), Port("h", (), "s")),
+        outputs=(Port("g_next", (n,)),),
+        body=body,
+        formula="one RK4 step of g' = M(g) u",
+        source="Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and Krishnaprasad, TR 93-59, (12)-(15)",
+        sampler=lambda rng: (*([rng.uniform(-0.3, 0.3) for _ in range(n)] for _ in range(4)), rng.uniform(0, 0.1)),
+    )

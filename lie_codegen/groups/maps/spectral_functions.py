@@ -1,0 +1,186 @@
+"""exp, log and the Jacobians where no closed form is known: scalar arithmetic modulo the characteristic polynomial.
+
+By Cayley and Hamilton f(A) = sum_i c_i A^i with fewer terms than A has rows, and where eigenvalues come in pairs +-lambda
+(so(n), so(p, q), sp(n), ad of a semisimple algebra) the even and the odd part of f are polynomials in A^2 of half that degree.
+The c_i follow from f modulo the characteristic polynomial, whose coefficients follow from traces by Newton's identities; see
+`QuotientRing`. Fixed depth, no branches.
+
+exp and its Jacobian: Taylor polynomials after scaling, then doubling. Measured on so4, su3, sl3, so31, sp4, sim3: 2e-15 relative
+     for eigenvalues (of ad for the Jacobian) up to 6 in modulus, 2e-14 up to 10.
+log: A = S g(V), S = (X - X^{-1})/2 = sinh A, V = (X + X^{-1})/2 - 1 = cosh A - 1, g(cosh t - 1) = t / sinh t by four halvings of
+     t. For eigenvalues a + i b the error grows like (1 + cos b)^-2: 1e-15 at b = 1, up to 4e-12 at b = 3, no digits at the cut pi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import factorial
+
+from lie_codegen.exact.even_spectrum import EvenSpectrum, newton_coefficients
+from lie_codegen.exact.invariant_form import Relation
+from lie_codegen.groups.maps.quotient_ring import Element, QuotientRing, matrix_value, power_sums, related_product
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.block_solve import add, product
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.cotangent import four_pi_squared, taylor
+from lie_codegen.kernel.linear import Matrix, identity, matadd, matmul, scaled
+
+_HALVINGS = 4
+_EVEN_TERMS = 11
+_EXP_TERMS = 16
+_LOG_TERMS = 13
+_ROOT_STEPS = (10, 6, 5, 4)
+_POLES = 3
+_REMAINDER_TERMS = 18
+
+
+def exponential(
+    ops: Arithmetic, A: Matrix, even: EvenSpectrum | None, relation: Relation, *, unitary: bool, traceless: bool
+) -> Matrix:
+    """exp(A); `unitary` where A is complex and antihermitian."""
+    if even is not None:
+        B = related_product(ops, A, A, 1, relation)
+        ring, powers = even_ring(ops, B, even, relation)
+        V, S = _half_scale(ring)
+        cosh, sinh = _doubled(ring, V, S)
+        cosh[0] = add(cosh[0], 1)
+        odd = related_product(ops, A, matrix_value(ops, sinh, powers, relation), -1, relation)
+        return matadd(matrix_value(ops, cosh, powers, relation), odd)
+    if unitary:
+        # A = i H: cosine and sine of H have real coefficients.
+        H = [[_times_i(entry, -1) for entry in row] for row in A]
+        ring, powers = _plain_ring(ops, H, traceless=traceless, real=True)
+        V, S = _half_scale(ring, step=1, sign=-1)
+        cosine, sine = _doubled(ring, V, S)
+        cosine[0] = add(cosine[0], 1)
+        return matrix_value(ops, [Complex(c, s) for c, s in zip(cosine, sine, strict=True)], powers)
+    ring, powers = _plain_ring(ops, A, traceless=traceless)
+    scale = Fraction(1, 2**_HALVINGS)
+    value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, _EXP_TERMS)])
+    for _ in range(_HALVINGS):
+        value = ring.plus(ring.times(value, value), value, 2)
+    value[0] = add(value[0], 1)
+    return matrix_value(ops, value, powers)
+
+
+def jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, relation: Relation, sign: int) -> Matrix:
+    """(e^a - 1)/a at a = sign ad = sinh(a)/a + a (cosh(a) - 1)/a^2, the last as 2 (sinh(a/2)/a)^2."""
+    ring, powers = even_ring(ops, related_product(ops, ad, ad, 1, relation), even, relation)
+    V, S = _half_scale(ring)
+    _, sinh = _doubled(ring, V, S)
+    odd = ring.scaled(2 * sign, ring.times(S, S))
+    first, second = (matrix_value(ops, e, powers, relation) for e in (sinh, odd))
+    return matadd(first, related_product(ops, ad, second, -1, relation))
+
+
+def plain_jacobian_of_exp(ops: Arithmetic, ad: Matrix, *, traceless: bool, sign: int) -> Matrix:
+    """(e^a - 1)/a at a = sign ad, for any spectrum: phi(2 t) = phi(t) (e^t + 1) / 2."""
+    ring, powers = _plain_ring(ops, ad, traceless=traceless)
+    scale = Fraction(sign, 2**_HALVINGS)
+    value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, _EXP_TERMS)])
+    phi = ring.series([scale**j / factorial(j + 1) for j in range(_EXP_TERMS)])
+    half = ops.constant(Fraction(1, 2))
+    for _ in range(_HALVINGS):
+        phi = ring.plus(phi, ring.times(value, phi), half)
+        value = ring.plus(ring.times(value, value), value, 2)
+    return matrix_value(ops, phi, powers)
+
+
+def inverse_jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, relation: Relation, sign: int) -> Matrix:
+    """a/(e^a - 1) at a = sign ad: a/2 coth(a/2) by its three nearest poles and a series, and -a/2."""
+    ring, powers = even_ring(ops, related_product(ops, ad, ad, 1, relation), even, relation)
+    poles = [four_pi_squared() * k * k for k in range(1, _POLES + 1)]
+    total = ring.series([_remainder(j, poles) for j in range(_REMAINDER_TERMS)])
+    for pole in poles:
+        total = ring.plus(total, ring.over_linear(ops.constant(pole)), 2)
+    total = ring.shifted(total)
+    total[0] = add(total[0], 1)
+    half = ops.constant(Fraction(-sign, 2))
+    return matadd(matrix_value(ops, total, powers, relation), ad, half)
+
+
+def logarithm(
+    ops: Arithmetic, X: Matrix, X_inverse: Matrix, even: EvenSpectrum | None, relation: Relation, *, unitary: bool
+) -> Matrix:
+    """log(X) from X and its inverse."""
+    half = ops.constant(Fraction(1, 2))
+    S = [scaled(half, row) for row in matadd(X, X_inverse, -1)]
+    V = matadd([scaled(half, row) for row in matadd(X, X_inverse)], identity(len(X)), -1)
+    if even is not None:
+        # S annihilates an eigenvalue zero without Jordan blocks, which therefore needs no factor.
+        ring, powers = even_ring(ops, V, EvenSpectrum(even.pairs, even.multiplicity, even.zero_is_defective), relation)
+    else:
+        ring, powers = _plain_ring(ops, V, traceless=False, real=unitary)
+    v = [0, 1] + [0] * (ring.r - 2) if ring.r > 1 else ring.shifted([1])
+    divisor = ring.constant(1)
+    for steps in _ROOT_STEPS:
+        y = ring.scaled(half, v)
+        y[0] = add(y[0], 1)
+        cosh = ring.square_root(y, steps)
+        divisor = ring.times(divisor, cosh)
+        v = [add(cosh[0], -1), *cosh[1:]]
+    series = [Fraction((-2) ** j * factorial(j) ** 2, factorial(2 * j + 1)) for j in range(_LOG_TERMS)]
+    g = ring.times(ring.compose(series, v), ring.inverse(divisor))
+    return matmul(S, matrix_value(ops, g, powers))
+
+
+def even_ring(ops: Arithmetic, B: Matrix, even: EvenSpectrum, relation: Relation) -> tuple[QuotientRing, list[Matrix]]:
+    """The ring of polynomials in B = A^2, and the powers of B that its elements are summed from."""
+    degree = even.pairs + even.has_zero
+    powers = _powers(ops, B, max((even.pairs + 1) // 2, 1 if degree < 3 else 2 if degree < 6 else 3), relation)
+    share = ops.constant(Fraction(1, even.multiplicity))
+    sums = [product(share, value) for value in power_sums(powers, even.pairs)]
+    coefficients = newton_coefficients(sums)
+    return QuotientRing(ops, [0, *coefficients] if even.has_zero else coefficients), powers
+
+
+def _plain_ring(
+    ops: Arithmetic, A: Matrix, *, traceless: bool, real: bool = False
+) -> tuple[QuotientRing, list[Matrix]]:
+    size = len(A)
+    powers = _powers(ops, A, max((size + 1) // 2, 1 if size < 3 else 2), {})
+    sums = power_sums(powers, size)
+    if traceless:
+        sums[0] = 0
+    if real:
+        sums = [Complex.of(value).re for value in sums]
+    return QuotientRing(ops, newton_coefficients(sums)), powers
+
+
+def _powers(ops: Arithmetic, A: Matrix, highest: int, relation: Relation) -> list[Matrix]:
+    powers = [identity(len(A)), A]
+    while len(powers) <= highest:
+        half = len(powers) // 2
+        a, b = powers[half], powers[len(powers) - half]
+        powers.append(related_product(ops, a, b, 1, relation))
+    return powers
+
+
+def _half_scale(ring: QuotientRing, step: int = 0, sign: int = 1) -> tuple[Element, Element]:
+    """cosh(t/2) - 1 and sinh(t/2)/t in t^2, or in t (step 1) and with sign -1 cos(t/2) - 1 and sin(t/2)."""
+    scale = Fraction(1, 2**_HALVINGS)
+    even = [Fraction(0)] + [sign**j * scale ** (2 * j) / factorial(2 * j) for j in range(1, _EVEN_TERMS)]
+    odd = [sign**j * scale ** (2 * j + 1) / factorial(2 * j + 1) for j in range(_EVEN_TERMS)]
+    if step:
+        even, odd = [c for e in even for c in (e, Fraction(0))], [c for o in odd for c in (Fraction(0), o)]
+    V, S = ring.series(even), ring.series(odd)
+    for _ in range(_HALVINGS - 1):
+        V, S = _doubled(ring, V, S)
+    return V, S
+
+
+def _doubled(ring: QuotientRing, V: Element, S: Element) -> tuple[Element, Element]:
+    """cosh 2t - 1 = 2 V^2 + 4 V and sinh 2t = 2 (1 + V) S: nothing is lost where V is small."""
+    square = ring.times(V, V)
+    return ring.plus(ring.scaled(2, square), V, 4), ring.scaled(2, ring.plus(S, ring.times(V, S)))
+
+
+def _times_i(entry: Scalar, sign: int) -> Scalar:
+    z = Complex.of(entry)
+    return Complex(product(-sign, z.im), product(sign, z.re))
+
+
+def _remainder(j: int, poles: Sequence[Fraction]) -> Fraction:
+    """The coefficient of mu^j in (E(mu) - 1)/mu less the poles' own."""
+    return taylor(j + 1) - sum((2 * (-1) ** j / pole ** (j + 1) for pole in poles), Fraction(0))

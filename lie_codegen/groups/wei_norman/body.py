@@ -1,0 +1,136 @@
+"""The Wei-Norman equations g' = M(g) u over any arithmetic.
+
+    X = exp(g_1 A_1) ... exp(g_n A_n),  X' = X hat(u),
+    M(g)^{-1} e_j = exp(-g_n ad_n) ... exp(-g_{j+1} ad_{j+1}) e_j.
+
+Each g_k occurs once in a column, so entries are multilinear in the modes and nothing needs simplifying.
+Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and Krishnaprasad, TR 93-59, (12)-(15).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.algebra.adjoint import ad
+from lie_codegen.exact.exponential import MatrixExponential, matrix_exponential
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
+from lie_codegen.groups.wei_norman.frames import Factors, Frames, Step, cheapest_steps, times_vector
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.block_solve import SparseMatrix, add, product
+from lie_codegen.kernel.complex_scalar import Complex
+
+
+@dataclass(frozen=True)
+class WeiNormanData:
+    """exp(x ad_k) and exp(x A_k) of every basis element, derived once a group."""
+
+    group: MatrixGroup
+
+    @cached_property
+    def adjoint(self) -> tuple[MatrixExponential, ...]:
+        """exp(x ad_{A_k}) for each k."""
+        return tuple(matrix_exponential(ad(self.group.algebra, k)) for k in range(self.group.dim))
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """How M(g)^{-1} g' = u is solved."""
+        return cheapest_steps(self.adjoint)
+
+    @cached_property
+    def defining(self) -> tuple[MatrixExponential, ...]:
+        """exp(x A_k) for each k; a complex A_k in its real form [[Re, -Im], [Im, Re]]."""
+        return tuple(matrix_exponential(_real_form(self.group, k)) for k in range(self.group.dim))
+
+
+def _real_form(group: MatrixGroup, k: int) -> sp.MatrixBase:
+    matrix = group.exact_basis[k]
+    if not group.is_complex:
+        return matrix
+    re, im = matrix.applyfunc(sp.re), matrix.applyfunc(sp.im)
+    return sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re))
+
+
+def inverse_columns(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> SparseMatrix:
+    """M(g)^{-1} as (row, column) -> entry, in the textbook form of its entries, for exact display."""
+    n = data.group.dim
+    exponentials: dict[int, Mapping[tuple[int, int], Scalar]] = {}
+    matrix: dict[tuple[int, int], Scalar] = {}
+    for j in range(n):
+        column: dict[int, Scalar] = {j: 1}
+        for k in range(j + 1, n):
+            if k not in exponentials:
+                exponentials[k] = ExponentialEntries(ops, -g[k], data.adjoint[k], printed=True).sparse()
+            column = times_vector(exponentials[k], column)
+        matrix.update({(i, j): value for i, value in column.items()})
+    return matrix
+
+
+def rate(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
+    """M(g) u."""
+    solution = _frames(ops, data, g).solve(data.steps, dict(enumerate(u)))
+    return [solution.get(i, 0) for i in range(data.group.dim)]
+
+
+def matrix(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> list[list[Scalar]]:
+    """M(g), row by row."""
+    frames, n = _frames(ops, data, g), data.group.dim
+    columns = [frames.solve(data.steps, {j: 1}) for j in range(n)]
+    return [[column.get(i, 0) for column in columns] for i in range(n)]
+
+
+def body_velocity(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
+    """u = M(g)^{-1} g': E_n (... E_2 (e_1 g_1') + e_2 g_2' ...) + e_n g_n'."""
+    factors, n = _factors(ops, data, g), data.group.dim
+    velocity: dict[int, Scalar] = {}
+    for k in range(n):
+        velocity = times_vector(factors(k, False), velocity)
+        velocity[k] = add(velocity.get(k, 0), rates[k])
+    return [velocity.get(i, 0) for i in range(n)]
+
+
+def _frames(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> Frames:
+    return Frames(_factors(ops, data, g), data.group.dim)
+
+
+def _factors(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> Factors:
+    @cache
+    def factor(k: int, forward: bool) -> SparseMatrix:
+        exponential = data.adjoint[k]
+        return ExponentialEntries(ops, g[k], exponential if forward else exponential.reflected).sparse()
+
+    return factor
+
+
+def product_exp(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> list[list[Any]]:
+    """exp(g_1 A_1) ... exp(g_n A_n), row by row; Complex entries for a complex group."""
+    size = data.group.degree * (2 if data.group.is_complex else 1)
+    columns = data.group.degree
+    product_: dict[tuple[int, int], Scalar] = {(i, i): 1 for i in range(columns)}
+    for k in reversed(range(data.group.dim)):
+        factor = ExponentialEntries(ops, g[k], data.defining[k]).sparse()
+        product_ = _times_matrix(factor, product_)
+    if not data.group.is_complex:
+        return [[product_.get((i, j), 0) for j in range(columns)] for i in range(size)]
+    return [
+        [Complex(product_.get((i, j), 0), product_.get((i + columns, j), 0)) for j in range(columns)]
+        for i in range(columns)
+    ]
+
+
+def _times_matrix(
+    left: Mapping[tuple[int, int], Scalar], right: Mapping[tuple[int, int], Scalar]
+) -> dict[tuple[int, int], Scalar]:
+    rows: dict[int, list[tuple[int, Scalar]]] = {}
+    for (m, j), value in right.items():
+        rows.setdefault(m, []).append((j, value))
+    result: dict[tuple[int, int], Scalar] = {}
+    for (i, m), entry in left.items():
+        for j, value in rows.get(m, []):
+            result[i, j] = add(result.get((i, j), 0), product(entry, value))
+    return result

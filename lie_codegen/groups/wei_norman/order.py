@@ -1,0 +1,169 @@
+"""lc.wei_norman_order: a basis order, and where it helps a basis, in which the Wei-Norman chart is large."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import permutations
+
+import sympy as sp
+
+from lie_codegen.algebra.ideal_chain import adapted_basis, chain_order, is_ideal, is_subalgebra
+from lie_codegen.algebra.structure import structure
+from lie_codegen.algebra.subspace import Vector
+from lie_codegen.exact.numbers import Number
+from lie_codegen.groups.change_of_basis import change_of_basis
+from lie_codegen.groups.iwasawa import iwasawa
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.wei_norman.chart_domain import ChartDomain, chart_domain
+from lie_codegen.groups.wei_norman.chart_end import combination_text
+
+_RANK = {"never": 0, "walls": 1, "either": 2, "escape": 3}
+#: Up to this dimension every order is tried.
+_ALL_ORDERS = 4
+
+
+@dataclass(frozen=True)
+class WeiNormanOrder:
+    """A recommended basis order for product-of-exponentials coordinates.
+
+    Attributes:
+        labels: the best order found of the group's own basis.
+        group: the group in that order.
+        domain: its chart.
+        change_of_basis: {new label: {label: coefficient}} of a basis with a better chart, None where none was found; give it
+            to `lc.change_of_basis`.
+        changed_group, changed_domain: the group in that basis and its chart, None without one.
+        reason: why, in words.
+    """
+
+    labels: tuple[str, ...]
+    group: MatrixGroup
+    domain: ChartDomain
+    change_of_basis: Mapping[str, Mapping[str, Number]] | None
+    changed_group: MatrixGroup | None
+    changed_domain: ChartDomain | None
+    reason: str
+
+    @property
+    def determinant(self) -> sp.Expr:
+        """det M^{-1} in the recommended order, factored."""
+        return self.domain.determinant
+
+    @property
+    def is_global(self) -> bool:
+        """Whether the recommended order (without a change of basis) is global."""
+        return self.domain.is_global
+
+
+def wei_norman_order(group: MatrixGroup) -> WeiNormanOrder:
+    """The basis order with the largest Wei-Norman chart, and why.
+
+    A solvable algebra gets an order along a chain of ideals, which is global. Otherwise the semisimple part comes first and
+    the radical after it, so that only the semisimple part limits the chart; up to four dimensions every order is tried.
+    Where a change of basis does better (Iwasawa's K, A, N for a noncompact semisimple part, an adapted basis for a solvable
+    algebra), it is offered beside. The present order wins ties.
+    """
+    best, domain = group, chart_domain(group)
+    for order in _candidates(group):
+        if domain.is_global:
+            break
+        other = group.reorder(order)
+        found = chart_domain(other)
+        if _score(found) < _score(domain):
+            best, domain = other, found
+    combinations = None if domain.is_global else _adapted_combinations(group)
+    changed = change_of_basis(group, combinations) if combinations else None
+    changed_domain = chart_domain(changed) if changed else None
+    if changed_domain is None or _RANK[changed_domain.end] >= _RANK[domain.end]:
+        combinations = changed = changed_domain = None
+    reason = _reason(group, best, domain, combinations, changed_domain)
+    return WeiNormanOrder(best.labels, best, domain, combinations, changed, changed_domain, reason)
+
+
+def _score(domain: ChartDomain) -> tuple[int, int, int]:
+    """Smaller is better: how the chart ends, walls that couple coordinates, number of walls."""
+    coupled = sum(len(wall.free_symbols) > 1 for wall in domain.walls)
+    return _RANK[domain.end], coupled, len(domain.walls)
+
+
+def _candidates(group: MatrixGroup) -> Iterator[tuple[str, ...]]:
+    algebra = group.algebra
+    everything = list(range(group.dim))
+    whole = chain_order(algebra, everything)
+    if whole is not None:
+        yield tuple(group.labels[i] for i in whole)
+        return
+    split = _split_by_basis(group)
+    if split is not None:
+        yield tuple(group.labels[i] for i in (*split[0], *split[1]))
+    if group.dim <= _ALL_ORDERS:
+        yield from permutations(group.labels)
+
+
+def _split_by_basis(group: MatrixGroup) -> tuple[list[int], list[int]] | None:
+    """(Levi part, radical in chain order) if both are spanned by basis elements."""
+    radical = [i for vector in structure(group.algebra).radical for i in _single(vector)]
+    if len(radical) != len(structure(group.algebra).radical):
+        return None
+    levi = [i for i in range(group.dim) if i not in radical]
+    order = chain_order(group.algebra, radical)
+    everything = list(range(group.dim))
+    if order is None or not is_subalgebra(group.algebra, levi) or not is_ideal(group.algebra, radical, everything):
+        return None
+    return levi, order
+
+
+def _single(vector: Vector) -> list[int]:
+    """[i] for a multiple of A_i, else []."""
+    found = [i for i, value in enumerate(vector) if value != 0]
+    return found if len(found) == 1 else []
+
+
+def _adapted_combinations(group: MatrixGroup) -> dict[str, dict[str, Number]] | None:
+    """Iwasawa's K, A, N of a Levi subalgebra, or that subalgebra as it is, then the radical in chain order."""
+    parts = structure(group.algebra)
+    blocks: list[tuple[str, tuple[Vector, ...]]] = []
+    if parts.levi:
+        decomposition = iwasawa(group, parts.levi)
+        blocks += (
+            [("s", parts.levi)]
+            if decomposition is None
+            else [("k", decomposition.k), ("a", decomposition.a), ("n", decomposition.n)]
+        )
+    blocks.append(("r", adapted_basis(group.algebra, parts.radical)))
+    taken = set(group.labels)
+    combinations: dict[str, dict[str, Number]] = {}
+    for letter, vectors in blocks:
+        for number, vector in enumerate(vectors, start=1):
+            single = _single(vector)
+            label = group.labels[single[0]] if single else _free(letter, number, len(vectors), taken)
+            combinations[label] = {group.labels[i]: value for i, value in enumerate(vector) if value != 0}
+            taken.add(label)
+    return combinations if len(combinations) == group.dim else None
+
+
+def _free(letter: str, number: int, count: int, taken: set[str]) -> str:
+    label = letter if count == 1 else f"{letter}{number}"
+    while label in taken:
+        label += "_"
+    return label
+
+
+def _reason(
+    group: MatrixGroup,
+    best: MatrixGroup,
+    domain: ChartDomain,
+    combinations: Mapping[str, Mapping[str, Number]] | None,
+    changed: ChartDomain | None,
+) -> str:
+    order = ", ".join(best.labels)
+    kept = "the present order" if best.labels == group.labels else "the order"
+    text = f"{group.name}: {kept} {order}: {domain.text}; {domain.reason}"
+    if combinations is None or changed is None:
+        return text
+    basis = ", ".join(
+        label if dict(row) == {label: 1} else f"{label} = {combination_text(row)}"
+        for label, row in combinations.items()
+    )
+    return f"{text}. With the basis {basis}: {changed.text}; {changed.reason}"

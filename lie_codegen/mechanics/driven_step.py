@@ -1,0 +1,102 @@
+"""One step of a mechanical system on a group under a wrench given in time: X' = X hat(xi), J xi' = ad*_xi J xi + f(t).
+
+J is an input, so that one compiled step, and one nonlinear program, serve every inertia. `second_order_step` is for forces
+that depend on the state.
+"""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
+from lie_codegen.groups.maps.matrices import random_element
+from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.units import force_units
+from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import Matrix, Vector, ad_star, bracket, matvec, plus, scaled
+
+
+def driven_increments(
+    group: MatrixGroup,
+    ops: Arithmetic,
+    xi: Vector,
+    J: Matrix,
+    inverse: Matrix,
+    f0: Vector,
+    fm: Vector,
+    f1: Vector,
+    h: Scalar,
+) -> tuple[Vector, Vector]:
+    """Theta and the change of xi with X_next = X exp(Theta): one RKMK4 step of Theta' = dexpinv(xi), J xi' = ad*_xi J xi + f."""
+
+    def rates(theta: Vector, change: Vector, force: Vector) -> tuple[Vector, Vector]:
+        eta = plus(xi, change)
+        once = bracket(ops, group.algebra, theta, eta)
+        twice = bracket(ops, group.algebra, theta, once)
+        turning = ad_star(ops, group.algebra, eta, matvec(J, eta))
+        return plus(eta, scaled(0.5, once), scaled(1 / 12, twice)), matvec(inverse, plus(turning, force))
+
+    zero: Vector = [0] * group.dim
+    stages = [rates(zero, zero, f0)]
+    for part, force in ((0.5, fm), (0.5, fm), (1, f1)):
+        k, a = stages[-1]
+        stages.append(rates(scaled(part * h, k), scaled(part * h, a), force))
+    (k1, a1), (k2, a2), (k3, a3), (k4, a4) = stages
+    sixth, third = h / 6, h / 3
+    theta = plus(scaled(sixth, plus(k1, k4)), scaled(third, plus(k2, k3)))
+    change = plus(scaled(sixth, plus(a1, a4)), scaled(third, plus(a2, a3)))
+    return theta, change
+
+
+def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE) -> Kernel:
+    """(state, inertia, inverse, f0, fm, f1, h) -> (state_next,): fourth order, on the group for |h xi| <= 1/4.
+
+    The state is the varying entries of X, then xi; f0, fm, f1 are the body force at t, t + h/2, t + h. Munthe-Kaas,
+    BIT 38 (1998) 92.
+
+    Args:
+        group: any matrix group.
+        degree: of the Taylor polynomial of the exponential.
+    """
+    n, size = group.dim, packed_size(group)
+
+    def body(
+        ops: Arithmetic, state: Vector, J: Matrix, inverse: Matrix, f0: Vector, fm: Vector, f1: Vector, h: Scalar
+    ) -> tuple[Any, ...]:
+        X, xi = unpack(group, state[:size]), list(state[size:])
+        theta, change = driven_increments(group, ops, xi, J, inverse, f0, fm, f1, h)
+        return ([*pack(group, times_taylor_exp(group, ops, X, theta, degree)), *plus(xi, change)],)
+
+    data = WeiNormanData(group)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        def vector() -> Vector:
+            return [rng.uniform(-1, 1) for _ in range(n)]
+
+        diagonal = [rng.uniform(1, 2) for _ in range(n)]
+        J = [[diagonal[i] if i == j else 0.0 for j in range(n)] for i in range(n)]
+        inverse = [[1 / diagonal[i] if i == j else 0.0 for j in range(n)] for i in range(n)]
+        state = [*pack(group, random_element(group, data, rng)), *vector()]
+        return state, J, inverse, vector(), vector(), vector(), rng.uniform(0, 0.05)
+
+    forces = (("f0", "t"), ("fm", "t + h/2"), ("f1", "t + h"))
+    return Kernel(
+        name="driven_step",
+        namespace=group.name,
+        inputs=(
+            Port("state", (size + n,), description="varying entries of X, row by row, then xi"),
+            Port("inertia", (n, n), description="symmetric positive definite"),
+            Port("inverse", (n, n), description="of the inertia"),
+            *(Port(name, (n,), force_units(group), description=f"body force at {when}") for name, when in forces),
+            Port("h", (), "s"),
+        ),
+        outputs=(Port("state_next", (size + n,)),),
+        body=body,
+        formula="X' = X hat(xi), J xi' = ad*_xi J xi + f(t): one RKMK4 step",
+        source="Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)",
+        sampler=sampler,
+    )

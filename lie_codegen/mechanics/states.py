@@ -1,0 +1,53 @@
+"""States of second-order motion as the compiled loops hold them: varying entries of X, then xi."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.errors import NotOnGroupError, ShapeError
+from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Array = NDArray[Any]
+
+
+def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | None) -> tuple[Array, bool]:
+    """(N, m) packed states, and whether several were given.
+
+    Raises:
+        ShapeError: X0 or xi0 has another shape.
+        NotOnGroupError: an entry that is 0 or 1 in every element of the group is not.
+    """
+    d, n = group.degree, group.dim
+    kind = complex if group.is_complex else float
+    X = np.eye(d, dtype=kind) if X0 is None else np.asarray(X0, dtype=kind)
+    xi = np.zeros(n) if xi0 is None else np.asarray(xi0, dtype=float)
+    if X.shape[-2:] != (d, d) or X.ndim not in (2, 3) or xi.shape[-1:] != (n,) or xi.ndim not in (1, 2):
+        raise ShapeError(f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},)")
+    many = X.ndim == 3 or xi.ndim == 2
+    count = max(X.shape[0] if X.ndim == 3 else 1, xi.shape[0] if xi.ndim == 2 else 1)
+    X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
+    rows, columns = np.array(varying_entries(group)).T
+    fixed = np.ones((d, d), bool)
+    fixed[rows, columns] = False
+    if np.max(np.abs((X - np.eye(d))[:, fixed]), initial=0.0) > 1e-9:
+        raise NotOnGroupError(f"X0 is not on {group.name}: an entry that is 0 or 1 in every element is not")
+    entries = np.ascontiguousarray(X[:, rows, columns])
+    flat = entries.view(float) if group.is_complex else entries
+    return np.ascontiguousarray(np.concatenate([flat.reshape(count, -1), xi], axis=1)), many
+
+
+def split_states(group: MatrixGroup, states: Array) -> tuple[Array, Array]:
+    """X (..., d, d) and xi (..., n) of packed states (..., m)."""
+    size = packed_size(group)
+    packed = np.ascontiguousarray(states[..., :size])
+    values = packed.view(complex) if group.is_complex else packed
+    X = np.broadcast_to(
+        np.eye(group.degree, dtype=values.dtype), (*states.shape[:-1], group.degree, group.degree)
+    ).copy()
+    rows, columns = np.array(varying_entries(group)).T
+    X[..., rows, columns] = values
+    return X, np.ascontiguousarray(states[..., size : size + group.dim])

@@ -1,0 +1,38 @@
+"""plot_plan: one call from a plan to a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lie_codegen.errors import OutputFolderError
+from lie_codegen.pictures.steering_picture import draw_plan
+from lie_codegen.steering.constraints import Obstacle
+from lie_codegen.steering.front import steer
+from lie_codegen.steering.plan import Plan
+
+
+def plot_plan(plan: Plan, path: str | Path, *, obstacles: Sequence[Obstacle] = (), compare: bool = True) -> Path:
+    """Draws controls, loops, path and energy into a file (png, svg, pdf); returns its path.
+
+    Args:
+        plan: any plan of `lc.steer`.
+        path: the file.
+        obstacles: drawn with the path.
+        compare: solve for the least energy without limits, for the comparison.
+
+    Raises:
+        MissingDependencyError: without matplotlib.
+        OutputFolderError: the file cannot be written.
+    """
+    minimum = plan.cost if plan.method == "optimal" else None
+    same_system = not any(plan.details.get("drift", ())) and "inertia" not in plan.details
+    if compare and minimum is None and same_system:
+        minimum = steer(plan.group, plan.target, plan.controls, plan.duration, "optimal").cost
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draw_plan(plan, minimum, obstacles).savefig(target, dpi=150)
+    except OSError as error:
+        raise OutputFolderError(f"{target}: cannot be written: {error.strerror or error}") from None
+    return target

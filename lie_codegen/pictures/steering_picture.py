@@ -1,0 +1,71 @@
+"""A plan as a picture: controls, the loops whose areas do the work, the path, and the cost against the minimum."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.flow.simulate import simulate
+from lie_codegen.mechanics.driven import simulate_driven
+from lie_codegen.pictures.result import new_figure
+from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
+from lie_codegen.pictures.steering_path import draw_path
+from lie_codegen.steering.constraints import Obstacle
+from lie_codegen.steering.plan import Plan
+
+Array = NDArray[Any]
+
+_SAMPLES = 1201
+
+
+def draw_plan(plan: Plan, minimum: float | None = None, obstacles: Sequence[Obstacle] = ()) -> Any:
+    """A matplotlib figure of a plan.
+
+    Args:
+        plan: any plan of `lc.steer`.
+        minimum: the least energy, for the comparison; left out where it is not known.
+        obstacles: drawn with the path.
+    """
+    t = np.linspace(0, plan.duration, _SAMPLES)
+    X, velocity = _motion(plan, t)
+    figure = new_figure(11, 8.5)
+    parts = figure.add_gridspec(2, 2)
+    _controls(figure.add_subplot(parts[0, 0]), plan, t)
+    draw_loops(figure.add_subplot(parts[0, 1]), plan, t, velocity)
+    draw_path(figure, parts[1, 0], plan, t, X, obstacles)
+    _cost(figure.add_subplot(parts[1, 1]), plan, minimum)
+    winner = plan.details.get("winner", plan.method.replace("_", " "))
+    figure.suptitle(f"{plan.group.name}: {winner}, endpoint error {plan.error:.1e}", fontsize=12)
+    return figure
+
+
+def _motion(plan: Plan, t: Array) -> tuple[Array, Array]:
+    """X and the controlled velocities of the true system: under torques if the plan's controls are."""
+    inertia, drift = plan.details.get("inertia"), plan.details.get("drift")
+    if inertia is not None:
+        run = simulate_driven(plan.group, plan.u, inertia, t=t, xi0=plan.details["start_velocity"])
+        return run.X, run.xi
+    return simulate(plan.group, plan.u if drift is None else plan.u.plus(drift), t=t).X, plan.u(t)
+
+
+def _controls(axes: Any, plan: Plan, t: Array) -> None:
+    u = plan.u(t)
+    for label, colour in zip(plan.controls, COLOURS * 3, strict=False):
+        axes.plot(t, u[:, plan.group.labels.index(label)], color=colour, label=label)
+    axes.set(title="controls", xlabel="t [s]", xlim=(0, plan.duration))
+    axes.legend(frameon=False)
+    axes.grid(color="0.92")
+
+
+def _cost(axes: Any, plan: Plan, minimum: float | None) -> None:
+    names, values = [f"this plan\n({plan.method})"], [plan.cost]
+    if minimum is not None:
+        names, values = [*names, "least energy\nwithout limits"], [*values, minimum]
+    bars = axes.barh(names, values, color=[COLOURS[0], GREY][: len(names)], height=0.5)
+    axes.bar_label(bars, fmt="%.6g", padding=3)
+    ratio = f", {plan.cost / minimum:.4g} times the least" if minimum else ""
+    axes.set(title="energy, int |u|^2 dt" + ratio, xlim=(0, 1.3 * max(*values, 1e-12)), ylim=(-0.7, 1.7))
+    axes.invert_yaxis()

@@ -1,0 +1,189 @@
+"""lc.euler_average: perturbed Euler's equations, averaged over the torque-free motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.errors import ComputationError, InputError
+from lie_codegen.groups.build import build
+from lie_codegen.kernel.elliptic import nome
+from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.rigid_body import euler_kernels
+from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_perturbation
+from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, check_slow
+from lie_codegen.runtime.broadcast import Array, broadcast_call
+from lie_codegen.runtime.library import Library
+
+NAMESPACE = "euler_average"
+_MOST_NODES = 8192
+
+
+class Variational(NamedTuple):
+    """Table 2: Omega' = eps F_Omega, k' = eps F_k, phi' = Lambda + eps G."""
+
+    F_Omega: Array
+    F_k: Array
+    G: Array
+    Lambda: Array
+
+
+class Averaged(NamedTuple):
+    """The means over phi of F_Omega [rad/s^2], F_k [1/s] and G [1/s]."""
+
+    F_Omega: Array
+    F_k: Array
+    G: Array
+
+
+@dataclass(frozen=True)
+class EulerAverage:
+    """The variational equations of a perturbed free rigid body, and their averages, per unit eps.
+
+    Attributes:
+        body: the body.
+        perturbation: the exact g_n.
+        tolerance: of the trapezoid rule, relative to the size of the averaged functions.
+    """
+
+    body: FreeRigidBody
+    perturbation: EulerPerturbation
+    tolerance: float = 1e-12
+
+    def kernels(self, *, largest_k: float = 0.9) -> tuple[Kernel, ...]:
+        """variational, rate and averaged, for lc.build and lc.generate.
+
+        Args:
+            largest_k: where g is not affine, the averages in C take as many fixed phases as rounding accuracy needs up
+                to this modulus, by the nome.
+        """
+        return (*self._basic(), self.averaged_kernel(largest_k))
+
+    def averaged_kernel(self, largest_k: float = 0.9) -> Kernel:
+        """(Omega, k) -> averages: Table 3 for affine g, else the trapezoid rule with `nodes_for(largest_k)` phases."""
+        return euler_kernels.averaged(self.perturbation, NAMESPACE, nodes_for(largest_k))
+
+    def _basic(self) -> tuple[Kernel, ...]:
+        make, g = euler_kernels, self.perturbation
+        return make.variational(g, NAMESPACE), make.rate(g, NAMESPACE)
+
+    @cached_property
+    def library(self) -> Library:
+        """Compiled: variational, rate and, where Table 3 applies, averaged."""
+        closed = (self.averaged_kernel(),) if self.is_closed else ()
+        return build((*self._basic(), *closed))
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether g is affine in omega, so that Table 3 gives the averages."""
+        return self.perturbation.averaged is not None
+
+    def variational(self, Omega: ArrayLike, k: ArrayLike, phi: ArrayLike, tau: ArrayLike = 0.0) -> Variational:
+        """(F_Omega, F_k, G, Lambda) at a phase, Table 2; arguments broadcast.
+
+        G has the pole 1/k of polar coordinates at k = 0.
+
+        Raises:
+            InputError: Omega not positive, k outside (0, 0.999999].
+        """
+        self._check(Omega, k)
+        return Variational(*broadcast_call(self.library.variational, *self._with_tau((Omega, k, phi), tau)))
+
+    def averaged(self, Omega: ArrayLike, k: ArrayLike, tau: ArrayLike = 0.0) -> Averaged:
+        """(F_Omega, F_k, G), averaged over phi: Table 3 where g is affine, else quadrature.
+
+        Raises:
+            InputError: as `variational` (k = 0 is allowed where Table 3 applies).
+            ComputationError: the quadrature does not converge, for a g with corners.
+        """
+        if self.is_closed:
+            self._check(Omega, k, at_zero=True)
+            return Averaged(*broadcast_call(self.library.averaged, *self._with_tau((Omega, k), tau)))
+        return self.quadrature(Omega, k, tau)
+
+    def quadrature(self, Omega: ArrayLike, k: ArrayLike, tau: ArrayLike = 0.0, nodes: int | None = None) -> Averaged:
+        """The averages by the trapezoid rule in phi, which converges geometrically for smooth g.
+
+        Args:
+            Omega, k, tau: as `averaged`.
+            nodes: number of phases; None starts from the nome of the largest k and doubles until half of the phases
+                give the same means to `tolerance`.
+        """
+        self._check(Omega, k)
+        spin, modulus, slow = (np.asarray(x, dtype=np.float64)[..., None] for x in (Omega, k, tau))
+        count = nodes or nodes_for(float(np.max(modulus)))
+        while True:
+            phases = np.arange(count) / count
+            values = np.stack(self.variational(spin, modulus, phases, slow)[:3])
+            means = values.mean(axis=-1)
+            error = np.abs(means - values[..., ::2].mean(axis=-1))
+            sizes = np.abs(values).mean(axis=-1)
+            rate = np.max([sizes[0] / spin[..., 0], sizes[1], sizes[2]], axis=0)
+            scale = np.stack([rate * spin[..., 0], rate, rate])
+            if nodes or bool(np.all(error <= self.tolerance * scale + 1e-300)):
+                return Averaged(*means)
+            count *= 2
+            if count > _MOST_NODES:
+                raise ComputationError(
+                    f"the averages over phi have converged to {float(np.max(error / (scale + 1e-300))):.1e} with "
+                    f"{_MOST_NODES} phases, not to {self.tolerance:.1e}: the perturbation is not smooth (abs?); "
+                    "give a larger tolerance"
+                )
+
+    def rate(self, omega: ArrayLike, eps: ArrayLike, tau: ArrayLike = 0.0) -> Array:
+        """omega' (..., 3) of the full equations (3) in the user's axes."""
+        return broadcast_call(self.library.rate, *self._with_tau((omega, eps), tau))[0]
+
+    def _with_tau(self, arguments: tuple[Any, ...], tau: ArrayLike) -> tuple[Any, ...]:
+        return arguments if self.perturbation.is_autonomous else (*arguments, tau)
+
+    def _check(self, Omega: ArrayLike, k: ArrayLike, *, at_zero: bool = False) -> None:
+        check_slow(Omega, k)
+        if np.any(np.asarray(Omega, dtype=np.float64) == 0):
+            raise InputError("Omega = 0: there is no torque-free motion to average over")
+        if not at_zero and np.any(np.asarray(k, dtype=np.float64) == 0):
+            raise InputError("k = 0 is the steady spin, the origin of the polar coordinates (k, phi): G has a pole")
+
+
+def nodes_for(k: float, tolerance: float = 1e-16) -> int:
+    """Phases the trapezoid rule needs at modulus k: Fourier coefficients fall like nome^(m/2).
+
+    The count has room for products of several elliptic functions, whose poles in the complex plane are multiple.
+    """
+    q = nome(k)
+    if q == 0:
+        return 16
+    return max(16, 8 * math.ceil((2 * math.log(tolerance) / math.log(q) + 12) / 8))
+
+
+def euler_average(
+    body: FreeRigidBody,
+    terms: Sequence[Any],
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    tolerance: float = 1e-12,
+) -> EulerAverage:
+    """Perturbed Euler's equations in (Omega, k, phi), and averaged.
+
+    Args:
+        body: of lc.free_rigid_body.
+        terms: (g_1, g_2, g_3), the perturbing angular accelerations per unit eps [rad/s^2] in the body's axes: texts
+            (or SymPy) in w1 w2 w3 [rad/s], dw1 dw2 dw3 [rad/s^2], tau = eps t, and the parameters.
+        parameters: name -> number.
+        tolerance: of the quadrature, relative.
+
+    Raises:
+        InputError: not three terms; a parameter without a value or hiding a variable.
+        ExpressionError: a text outside the grammar, with its column.
+
+    Source: Coppola, (24), Tables 2 and 3.
+    """
+    if not isinstance(body, FreeRigidBody):
+        raise InputError(f"expected a body of free_rigid_body, got {type(body).__name__}")
+    return EulerAverage(body, euler_perturbation(body.model, terms, parameters), tolerance)

@@ -1,0 +1,153 @@
+"""Equilibria of the averaged rigid body: limit cycles on the momentum sphere (35), (36), and fixed spins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.errors import InputError
+from lie_codegen.kernel.elliptic import LARGEST_MODULUS, jacobi, ladder
+from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
+from lie_codegen.rigid_body.euler_average import EulerAverage
+from lie_codegen.rigid_body.principal_body import TAU
+from lie_codegen.runtime.broadcast import Array
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A root k of the averaged Fbar_k: a closed curve on the momentum sphere that the motion keeps or leaves.
+
+    Attributes:
+        k: the root.
+        Omega: where Fbar_k was evaluated.
+        slope: dFbar_k / dk there, per unit eps [1/s].
+        growth: Fbar_Omega / Omega, the relative growth of the spin per unit eps [1/s].
+        stable: slope < 0.
+    """
+
+    k: float
+    Omega: float
+    slope: float
+    growth: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether neighbouring motions approach the cycle."""
+        return self.slope < 0
+
+
+def limit_cycles(
+    flow: EulerAverage, *, Omega: float = 1.0, largest_k: float = 0.9999, tau: float = 0.0
+) -> tuple[LimitCycle, ...]:
+    """Roots of Fbar_k(Omega, k) in 0 < k < largest_k at a fixed Omega.
+
+    For g homogeneous in omega (linear feedback, drag) the roots do not depend on Omega: the cycle exists on the momentum
+    sphere whether or not the spin grows, (35). It is an equilibrium of the averaged flow when `growth` is 0, (36).
+    """
+    from scipy.optimize import brentq
+
+    def drift(k: float) -> float:
+        return float(flow.averaged(Omega, k, tau).F_k)
+
+    grid = np.concatenate([np.linspace(1e-4, 0.99, 160), 1 - np.geomspace(0.0098, 1 - largest_k, 40)])
+    values = np.array(flow.averaged(Omega, grid, tau).F_k)
+    size = float(np.abs(np.stack(flow.averaged(Omega, grid, tau)[:2])).max())
+    found = []
+    if size > 0 and np.abs(values).max() > 1e-12 * size:
+        for left, right, a, b in zip(grid, grid[1:], values, values[1:], strict=False):
+            if a * b < 0 or a == 0:
+                found.append(left if a == 0 else brentq(drift, left, right, xtol=1e-14, rtol=1e-14))
+    cycles = []
+    for k in found:
+        step = 1e-5 * min(k, 1 - k)
+        slope = (drift(k + step) - drift(k - step)) / (2 * step)
+        growth = float(flow.averaged(Omega, k, tau).F_Omega) / Omega
+        cycles.append(LimitCycle(float(k), Omega, slope, growth))
+    return tuple(cycles)
+
+
+@dataclass(frozen=True)
+class SlowEquilibrium:
+    """A zero of (Fbar_Omega, Fbar_k) with the eigenvalues [1/s] of the slow flow there, per unit eps."""
+
+    Omega: float
+    k: float
+    eigenvalues: tuple[complex, complex]
+
+    @property
+    def stable(self) -> bool:
+        """Both eigenvalues have negative real part."""
+        return max(value.real for value in self.eigenvalues) < 0
+
+
+def slow_equilibria(
+    flow: EulerAverage,
+    Omega_range: tuple[float, float],
+    *,
+    k_range: tuple[float, float] = (1e-3, 0.999),
+    tau: float = 0.0,
+) -> tuple[SlowEquilibrium, ...]:
+    """Isolated equilibria of the averaged flow in a box: Newton from a 24 x 24 grid, near-duplicates dropped.
+
+    Raises:
+        InputError: the flow is degenerate there, as for homogeneous g: use `limit_cycles`.
+    """
+    from scipy.optimize import root
+
+    def field(x: Array) -> Array:
+        k = float(np.clip(x[1], 1e-9, LARGEST_MODULUS))
+        values = flow.averaged(max(float(x[0]), 1e-9), k, tau)
+        return np.array([values.F_Omega, values.F_k], dtype=np.float64)
+
+    def jacobian(x: Array) -> Array:
+        steps = np.array([1e-6 * x[0], 1e-6 * min(x[1], 1 - x[1])])
+        columns = [(field(x + s) - field(x - s)) / (2 * s[i]) for i, s in enumerate(np.diag(steps))]
+        return np.column_stack(columns)
+
+    spins, moduli = np.meshgrid(np.linspace(*Omega_range, 24), np.linspace(*k_range, 24), indexing="ij")
+    values = np.stack(flow.averaged(spins, moduli, tau)[:2])
+    change = np.logical_and.reduce([_changes_sign(component) for component in values])
+    found: list[SlowEquilibrium] = []
+    for i, j in zip(*np.nonzero(change), strict=True):
+        start = np.array([spins[i : i + 2, j].mean(), moduli[i, j : j + 2].mean()])
+        result = root(field, start, tol=1e-13)
+        x = result.x
+        inside = Omega_range[0] <= x[0] <= Omega_range[1] and k_range[0] <= x[1] <= k_range[1]
+        if not (inside and np.abs(field(x)).max() < 1e-10):
+            continue
+        if any(abs(e.Omega - x[0]) + abs(e.k - x[1]) < 1e-7 for e in found):
+            continue
+        matrix = jacobian(x)
+        if abs(np.linalg.det(matrix)) < 1e-9 * np.linalg.norm(matrix) ** 2:
+            raise InputError("the slow flow has a line of equilibria (homogeneous g): use limit_cycles")
+        first, second = (complex(v) for v in np.linalg.eigvals(matrix))
+        found.append(SlowEquilibrium(float(x[0]), float(x[1]), (first, second)))
+    return tuple(found)
+
+
+def _changes_sign(values: Array) -> Any:
+    corners = np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]])
+    return (corners.min(axis=0) <= 0) & (corners.max(axis=0) >= 0)
+
+
+def limit_cycle_gains(k: float, first: float) -> tuple[float, float]:
+    """(N_2, N_3) that make k a limit cycle without change of spin, given N_1, (36).
+
+    Coded without cancellation: E - (1 - k^2) K = k^2 K (1 - S), E - K = -k^2 K S, E = K (1 - k^2 S).
+    """
+    mean = ladder(NumpyArithmetic(), np.float64(k)).S
+    return float(-(1 - mean) / mean * first), float(k**2 * (1 - mean) / (1 - k**2 * mean) * first)
+
+
+def momentum_directions(flow: EulerAverage, k: float, count: int = 200) -> Array:
+    """(count, 3) points of the curve of modulus k on the momentum sphere, (12), along the paper's axes."""
+    body = flow.body.model
+    ops = NumpyArithmetic()
+    at = jacobi(ops, np.linspace(0, 1, count), ladder(ops, np.float64(k)))
+    g13, g23 = float(body.small_gamma(1, 3).subs(TAU, 0)), float(body.small_gamma(2, 3).subs(TAU, 0))
+    s1, s2, s3 = body.signs
+    third = 1 / np.sqrt(1 + g13**2 * k**2)
+    points: Array = third * np.stack([s1 * g13 * k * at.cn, s2 * g23 * k * at.sn, s3 * at.dn], axis=-1)
+    return points

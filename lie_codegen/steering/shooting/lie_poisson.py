@@ -1,0 +1,241 @@
+"""The extremals of minimum-energy steering, piece by piece, as the kernels that the shooting solver loops over.
+
+    minimise 1/2 int_0^1 sum_i w_i u_i^2 dt   subject to   X' = X sum_i u_i A_i,  X(0) = I,  X(1) = target
+
+Pontryagin: u_i = <mu, A_i> / w_i, mu' = ad*_u mu, that is mu'_j = sum_i u_i c[i, j, k] mu_k (Lie-Poisson). With
+Psi = d mu / d mu(0) and Xi = vee(X^-1 dX / d mu(0)), column by column,
+    psi'_j = sum_i (du_i c[i, j, k] mu_k + u_i c[i, j, k] psi_k),   xi' = du + [xi, u],   du_i = psi_i / w_i.
+Everything is a polynomial, so that the same text runs on one double or on a vector of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
+from lie_codegen.groups.maps.rkmk import bracket_body, hat_body, sum_products
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.block_solve import add
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import plus
+from lie_codegen.steering.shooting.lie_poisson_ends import advance, correction, endpoint, offset, sparse_product
+
+
+def shooting_kernels(group: MatrixGroup, controls: tuple[int, ...]) -> tuple[Kernel, ...]:
+    """All that the shooting solver needs to know about a group; elements of the group are packed."""
+    return (
+        costate_step(group, controls),
+        path_step(group, controls),
+        leap(group, controls),
+        flow_step(group, controls),
+        column_step(group, controls),
+        endpoint(group),
+        advance(group),
+        offset(group),
+        correction(group),
+    )
+
+
+def transport(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u, mu, X) -> (ad*_u mu, X hat(u)): bilinear in u and (mu, X)."""
+
+    def body(ops: Arithmetic, u: Any, mu: Any, X: Any) -> tuple[Any, ...]:
+        return _coadjoint(group, controls, ops, u, mu), _moving(group, controls, ops, u, X)
+
+    return Kernel(
+        "transport",
+        group.name,
+        (Port("u", (len(controls),)), Port("mu", (group.dim,)), Port("X", (packed_size(group),))),
+        (Port("mu_rate", (group.dim,)), Port("X_rate", (packed_size(group),))),
+        body,
+        formula="mu' = ad*_u mu, X' = X hat(u)",
+    )
+
+
+def costate_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u at the start, in the middle and at the end, mu) -> mu in the middle (third order) and at the end of a step.
+
+    Classical Runge-Kutta with its dense output; the controls are given and multiplied by h.
+    """
+    n, m = group.dim, len(controls)
+
+    def body(ops: Arithmetic, u0: Any, u1: Any, u2: Any, mu: Any) -> tuple[Any, ...]:
+        u = (u0, u1, u2)
+        steps = _stages(ops, lambda y, half: _coadjoint(group, controls, ops, u[half], y), mu)
+        weights = [ops.constant(Fraction(k, 24)) for k in (5, 4, 4, -1)]
+        middle = [y + sum_products(zip(weights, slopes, strict=True)) for y, *slopes in zip(mu, *steps, strict=True)]
+        return middle, _after(ops, mu, steps)
+
+    return Kernel(
+        "costate_step",
+        group.name,
+        (*(Port(name, (m,)) for name in ("u0", "u1", "u2")), Port("mu", (n,))),
+        (Port("mu_middle", (n,)), Port("mu_next", (n,))),
+        body,
+        formula="a Runge-Kutta step of mu' = ad*_u mu, and mu half way",
+    )
+
+
+def path_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(u at the start, in the middle and at the end, X) -> X after a Runge-Kutta step of X' = X hat(u)."""
+    size, m = packed_size(group), len(controls)
+
+    def body(ops: Arithmetic, u0: Any, u1: Any, u2: Any, X: Any) -> tuple[Any, ...]:
+        u = (u0, u1, u2)
+        steps = _stages(ops, lambda Y, half: _moving(group, controls, ops, u[half], Y), X)
+        return (_after(ops, X, steps),)
+
+    return Kernel(
+        "path_step",
+        group.name,
+        (*(Port(name, (m,)) for name in ("u0", "u1", "u2")), Port("X", (size,))),
+        (Port("X_next", (size,)),),
+        body,
+        formula="a Runge-Kutta step of X' = X hat(u)",
+    )
+
+
+def leap(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(v, before, here) -> before + 2 h f(here) for (mu, X), where v_i = 2 h / w_i: a substep of the midpoint rule."""
+    n, size = group.dim, packed_size(group)
+
+    def body(ops: Arithmetic, v: Any, mu_before: Any, X_before: Any, mu: Any, X: Any) -> tuple[Any, ...]:
+        mu_rate, X_rate = _rates(group, controls, ops, v, mu, X)
+        return plus(mu_before, mu_rate), plus(X_before, X_rate)
+
+    return Kernel(
+        "leap",
+        group.name,
+        (
+            Port("v", (len(controls),)),
+            *(Port(name, (n,)) if name.startswith("mu") else Port(name, (size,)) for name in _LEAP),
+        ),
+        (Port("mu_next", (n,)), Port("X_next", (size,))),
+        body,
+        formula="before + 2 h f(here), v_i = 2 h / w_i",
+    )
+
+
+_LEAP = ("mu_before", "X_before", "mu", "X")
+
+
+def flow_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """(v, mu, X) -> (mu, X) after a classical Runge-Kutta step h, where v_i = h / w_i."""
+    n, size = group.dim, packed_size(group)
+
+    def body(ops: Arithmetic, v: Any, mu: Any, X: Any) -> tuple[Any, ...]:
+        def rate(state: Sequence[Scalar], _: int) -> list[Scalar]:
+            mu_rate, X_rate = _rates(group, controls, ops, v, state[:n], state[n:])
+            return [*mu_rate, *X_rate]
+
+        after = _runge_kutta(ops, rate, [*mu, *X])
+        return after[:n], after[n:]
+
+    return Kernel(
+        "flow_step",
+        group.name,
+        (Port("v", (len(controls),)), Port("mu", (n,)), Port("X", (size,))),
+        (Port("mu_next", (n,)), Port("X_next", (size,))),
+        body,
+        formula="a Runge-Kutta step h of mu' = ad*_u mu, X' = X hat(u); v_i = h / w_i",
+    )
+
+
+def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
+    """One column of the variational equations over a Runge-Kutta step h, where v_i = h / w_i.
+
+    (v, mu at the start, in the middle and at the end, psi, xi) -> (psi, xi):
+    psi' = ad*_du mu + ad*_u psi, xi' = du + [xi, u], du_i = psi_i / w_i.
+    """
+    n, m = group.dim, len(controls)
+
+    def body(ops: Arithmetic, v: Any, mu0: Any, mu1: Any, mu2: Any, psi: Any, xi: Any) -> tuple[Any, ...]:
+        nodes = [(_velocity(controls, v, mu), mu) for mu in (mu0, mu1, mu2)]
+
+        def rate(state: Sequence[Scalar], half: int) -> list[Scalar]:
+            (u, mu), psi, xi = nodes[half], state[:n], state[n:]
+            du = _velocity(controls, v, psi)
+            psi_rate = plus(_coadjoint(group, controls, ops, du, mu), _coadjoint(group, controls, ops, u, psi))
+            xi_rate = bracket_body(group, ops, xi, _spread(group, controls, u))
+            for value, position in zip(du, controls, strict=True):
+                xi_rate[position] = add(value, xi_rate[position])
+            return [*psi_rate, *xi_rate]
+
+        after = _runge_kutta(ops, rate, [*psi, *xi])
+        return after[:n], after[n:]
+
+    return Kernel(
+        "column_step",
+        group.name,
+        (Port("v", (m,)), *(Port(name, (n,)) for name in ("mu0", "mu1", "mu2", "psi", "xi"))),
+        (Port("psi_next", (n,)), Port("xi_next", (n,))),
+        body,
+        formula="a Runge-Kutta step h of psi' = ad*_du mu + ad*_u psi, xi' = du + [xi, u]; v_i = h / w_i",
+    )
+
+
+def _runge_kutta(
+    ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
+) -> list[Scalar]:
+    """y after one classical step; rate(y, k) is h f at the time k h / 2."""
+    return _after(ops, y, _stages(ops, rate, y))
+
+
+def _stages(
+    ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
+) -> tuple[list[Scalar], ...]:
+    half = ops.constant(Fraction(1, 2))
+    k1 = rate(y, 0)
+    k2 = rate([a + half * k for a, k in zip(y, k1, strict=True)], 1)
+    k3 = rate([a + half * k for a, k in zip(y, k2, strict=True)], 1)
+    return k1, k2, k3, rate(plus(y, k3), 2)
+
+
+def _after(ops: Arithmetic, y: Sequence[Scalar], stages: tuple[list[Scalar], ...]) -> list[Scalar]:
+    sixth = ops.constant(Fraction(1, 6))
+    return [
+        a + sixth * (add(first, last) + 2 * add(second, third))
+        for a, first, second, third, last in zip(y, *stages, strict=True)
+    ]
+
+
+def _rates(
+    group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, v: Any, mu: Sequence[Scalar], X: Sequence[Scalar]
+) -> tuple[list[Scalar], list[Any]]:
+    """h times the rates of mu and X."""
+    u = _velocity(controls, v, mu)
+    return _coadjoint(group, controls, ops, u, mu), _moving(group, controls, ops, u, X)
+
+
+def _velocity(controls: tuple[int, ...], v: Sequence[Scalar], mu: Sequence[Scalar]) -> list[Scalar]:
+    return [factor * mu[position] for factor, position in zip(v, controls, strict=True)]
+
+
+def _coadjoint(
+    group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, u: Sequence[Scalar], mu: Sequence[Scalar]
+) -> list[Scalar]:
+    position = {basis: number for number, basis in enumerate(controls)}
+    result: list[Scalar] = [0] * group.dim
+    for (i, j), row in group.algebra.table.items():
+        pairing = sum_products(
+            (ops.constant(value) if abs(value) != 1 else int(value), mu[k]) for k, value in row.items()
+        )
+        if i in position:
+            result[j] = add(result[j], u[position[i]] * pairing)
+        if j in position:
+            result[i] = add(result[i], -(u[position[j]] * pairing))
+    return result
+
+
+def _moving(group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, u: Sequence[Scalar], X: Any) -> list[Any]:
+    return pack(group, sparse_product(unpack(group, X), hat_body(group, ops, _spread(group, controls, u))))
+
+
+def _spread(group: MatrixGroup, controls: tuple[int, ...], u: Sequence[Scalar]) -> list[Scalar]:
+    full: list[Scalar] = [0] * group.dim
+    for value, position in zip(u, controls, strict=True):
+        full[position] = value
+    return full

@@ -1,0 +1,96 @@
+"""Why there is no admissible manoeuvre: what was tried, how near it came, and which limits stand in the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.steering.task import Task
+from lie_codegen.steering.transcription.flow import fly
+from lie_codegen.steering.transcription.guess import guesses, smooth_torques
+from lie_codegen.steering.transcription.numbers import Numbers, over
+from lie_codegen.steering.transcription.solve import Candidate
+from lie_codegen.steering.transcription.structure import Structure
+
+Array = NDArray[Any]
+
+
+def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Sequence[Candidate]) -> str:
+    """One line: the limits in the way, most important first, and what to try."""
+    lines = [f"steer({task.group.name}): no admissible manoeuvre"]
+    if candidates:
+        nearest = min(each.miss if np.isfinite(each.miss) else each.violation for each in candidates)
+        lines[0] += (
+            f" from {len(candidates)} starts with {structure.intervals} intervals (smallest violation {nearest:.2g}; "
+            f"{candidates[0].solves[-1].message})"
+        )
+    first = next(iter(guesses(task, structure, numbers, 1)), None)
+    if first is not None:
+        lines += _needs(task, structure, numbers, first[1])
+    advice = "more starts or more intervals"
+    if not structure.free_time:
+        advice = f"a longer duration, {advice}"
+    elif numbers.longest < 1e3:
+        advice = f"a larger `longest`, {advice}"
+    return "; ".join([*lines, f"try {advice}"])
+
+
+def ends_in_obstacles(task: Task, numbers: Numbers) -> list[str]:
+    """The ends and the via points that lie inside an obstacle."""
+    places = [("start", np.eye(task.group.degree)), ("target", task.target)]
+    places += [(f"via point {number}", element) for number, element in enumerate(numbers.via, start=1)]
+    return [
+        f"the {which} itself is inside {name}"
+        for obstacle, name in zip(numbers.obstacles, numbers.obstacle_names, strict=True)
+        for which, element in places
+        if obstacle.clearance(element[None])[0] < 0
+    ]
+
+
+def _needs(task: Task, structure: Structure, numbers: Numbers, v: Array) -> list[str]:
+    """What a manoeuvre without limits would need of each limit."""
+    lines = []
+    labels = [task.group.labels[i] for i in structure.controls]
+    if numbers.dynamics is None:
+        needs, what = v, "without limits the least-energy manoeuvre needs"
+        states = fly(task.group, task.controls, numbers, v, 1.0).X
+    else:
+        what = "the first guess needs"
+        states, xi, needs = smooth_torques(task, structure, numbers, v)
+        fast = np.max(over(xi, numbers.dynamics.speeds), axis=0)
+        lines += [
+            f"{what} {ratio:.3g} times the velocity bound of {label}"
+            for label, ratio in zip(task.group.labels, fast, strict=True)
+            if ratio > 1 and not structure.free_time
+        ]
+    if not structure.free_time:
+        above = np.max(numbers.ratios(needs), axis=0)
+        steep = np.max(over(np.diff(needs, axis=0) * structure.intervals, numbers.rates), axis=0)
+        for number, (label, ratio, slope) in enumerate(zip(labels, above, steep, strict=True)):
+            if ratio > 1:
+                lines.append(f"{what} {ratio:.3g} times the bound of {label}")
+            if slope > 1:
+                lines.append(f"{what} {slope:.3g} times the rate bound of {label}")
+            low, high = numbers.bounds[0][number], numbers.bounds[1][number]
+            wants = float(np.mean(needs[:, number]))
+            if low > 0 or high < 0:
+                lines.append(
+                    f"the bounds of {label} exclude zero; its mean without limits is {_unit(wants, task, numbers):.3g}"
+                )
+        enough = max(float(np.max(above)), float(np.sqrt(np.max(steep))))
+        if 1 < enough < np.inf and not np.any(numbers.drift) and numbers.dynamics is None and not numbers.rest:
+            lines.append(f"{task.duration * enough:.4g} s would be enough for the bounds on the controls")
+    crossed = [
+        name
+        for obstacle, name in zip(numbers.obstacles, numbers.obstacle_names, strict=True)
+        if np.min(obstacle.clearance(states)) < 0
+    ]
+    lines += [f"it crosses {name}" for name in crossed]
+    return lines
+
+
+def _unit(value: float, task: Task, numbers: Numbers) -> float:
+    return value / task.duration**numbers.power

@@ -1,0 +1,67 @@
+"""What holds at a node of the transcription: elements to meet, obstacles to keep away from, limits on rates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from lie_codegen.groups.maps.element_pattern import unpack
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
+from lie_codegen.steering.transcription.structure import Structure
+from lie_codegen.steering.transcription.tangent import pushed
+
+_WITHIN = 0.5
+
+
+def path(structure: Structure, kind: str) -> Piece:
+    """The conditions at a node: zero, X = goal; then not below zero: its half-space, clearances, and limits on rates where time is free.
+
+    Args:
+        structure: the structure.
+        kind: "first", "inner", "via" or "last".
+    """
+    at = symbols(structure)
+    rows = []
+    if kind in ("via", "last"):
+        rows.append(_miss(structure.group, at.goal, at.parts["X"]))
+        if structure.guarded:
+            rows.append(ca.dot(at.goal, at.parts["X"] - at.goal) + _WITHIN)
+    if kind in ("inner", "via"):
+        rows += _clearances(structure, at)
+    if kind != "last" and structure.free_time:
+        reach = at.parts["rates"] * at.parts["s"] / structure.intervals
+        rows += [reach - at.parts["r"], reach + at.parts["r"]]
+    g = ca.densify(ca.vertcat(*rows))
+    factor, multipliers = ca.SX.sym("factor"), ca.SX.sym("multipliers", g.numel())
+    inputs = {"w": at.w, "p": at.p, "goal": at.goal}
+    weighted = {**inputs, "factor": factor, "multipliers": multipliers}
+    curve, slope = ca.hessian(ca.dot(multipliers, g), at.w)
+    return Piece(
+        value=named_function(f"{kind}_value", inputs, [g]),
+        slope=named_function(f"{kind}_slope", inputs, [g, ca.jacobian(g, at.w)]),
+        curve=named_function(f"{kind}_curve", weighted, [ca.densify(slope), curve]),
+        rows=g.numel(),
+    )
+
+
+def _miss(group: MatrixGroup, goal: Any, X: Any) -> Any:
+    """q_k = <goal A_k, X - goal>, zero, near the goal, only there: n equations, of full rank."""
+    return ca.vertcat(*[ca.dot(pushed(group, goal, A), X - goal) for A in group.basis])
+
+
+def _clearances(structure: Structure, at: Symbols) -> list[Any]:
+    d = structure.group.degree
+    if not structure.cones + structure.balls:
+        return []
+    matrix = unpack(structure.group, ca.vertsplit(at.parts["X"]))
+    cones, balls = ca.reshape(at.parts["cones"], 7, -1), ca.reshape(at.parts["balls"], d, -1)
+    rows = []
+    for number in range(structure.cones):
+        pointing = sum(cones[3 + i, number] * matrix[i][j] * cones[j, number] for i in range(3) for j in range(3))
+        rows.append(cones[6, number] - pointing)
+    for number in range(structure.balls):
+        square = sum((matrix[i][d - 1] - balls[i, number]) ** 2 for i in range(d - 1))
+        rows.append(square - balls[d - 1, number] ** 2)
+    return rows

@@ -1,0 +1,67 @@
+"""Linear maps of a group in CasADi: right translation of packed elements, ad, and the bracket paired with a covector."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+Array = NDArray[Any]
+
+
+def push(group: MatrixGroup, B: Array) -> tuple[Any, Any]:
+    """R, c with pack(X B) = R pack(X) + c."""
+    entries = varying_entries(group)
+    parts = 2 if group.is_complex else 1
+    size = parts * len(entries)
+
+    def packed(X: Array) -> Array:
+        picked = np.array([X[i, j] for i, j in entries], dtype=complex if group.is_complex else float)
+        return np.ascontiguousarray(picked).view(float)
+
+    rest = np.eye(group.degree, dtype=complex)
+    for i, j in entries:
+        rest[i, j] = 0
+    kind: Any = complex if group.is_complex else float
+    constant = packed((rest @ B).astype(kind) if group.is_complex else np.real(rest @ B))
+    columns = np.zeros((size, size))
+    for number in range(size):
+        i, j = entries[number // parts]
+        unit = np.zeros((group.degree, group.degree), dtype=complex)
+        unit[i, j] = 1j if number % parts else 1
+        moved = unit @ B
+        columns[:, number] = packed(moved if group.is_complex else np.real(moved))
+    return ca.sparsify(ca.DM(columns)), ca.sparsify(ca.DM(constant))
+
+
+def pushed(group: MatrixGroup, moved: Any, B: Array) -> Any:
+    """pack(X B) of moved = pack(X)."""
+    R, c = push(group, B)
+    return R @ moved + c
+
+
+def ad_matrix(group: MatrixGroup, theta: Any) -> Any:
+    """ad_theta as a matrix: column j is [theta, e_j]."""
+    n = group.dim
+    result = ca.SX(n, n)
+    for (i, j), row in group.algebra.table.items():
+        for k, value in row.items():
+            result[k, j] += float(value) * theta[i]
+            result[k, i] -= float(value) * theta[j]
+    return result
+
+
+def wedge(group: MatrixGroup, w: Any) -> Any:
+    """P[i, k] = w . [e_i, e_k]."""
+    n = group.dim
+    result = ca.SX(n, n)
+    for (i, j), row in group.algebra.table.items():
+        for k, value in row.items():
+            result[i, j] += float(value) * w[k]
+            result[j, i] -= float(value) * w[k]
+    return result

@@ -1,0 +1,217 @@
+"""method="transcription": whatever has bounds, obstacles, drift, torques, via points or a free time; multiple shooting.
+
+The program is built once for its structure (`transcription_problem`) and solved for any numbers, from several first guesses:
+the unconstrained optimum by shooting, a straight path, the area rule. Solvers' own flags are not believed: the true
+system is integrated under the controls found, and the clearance of every obstacle is taken on a fine grid; where it
+is violated between the nodes, the obstacle is enlarged by as much and the program solved again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.errors import ComputationError, SteeringError
+from lie_codegen.flow.metric import distance
+from lie_codegen.steering.constraints import Obstacle
+from lie_codegen.steering.plan import Plan, Status
+from lie_codegen.steering.task import Task
+from lie_codegen.steering.transcription.complaint import complaint, ends_in_obstacles
+from lie_codegen.steering.transcription.flow import piecewise_linear
+from lie_codegen.steering.transcription.guess import first_variables, guesses
+from lie_codegen.steering.transcription.numbers import Numbers, Options
+from lie_codegen.steering.transcription.pose import pose
+from lie_codegen.steering.transcription.problem import endable, program
+from lie_codegen.steering.transcription.solve import Candidate, Workbench, predicted_aim, refined
+from lie_codegen.steering.transcription.structure import Structure
+
+Array = NDArray[Any]
+
+_FALLBACK = 4
+
+
+def transcription(
+    task: Task,
+    *,
+    bounds: Any = None,
+    rate_bounds: Any = None,
+    obstacles: Sequence[Obstacle] = (),
+    via: Sequence[tuple[float, ArrayLike]] = (),
+    drift: ArrayLike | None = None,
+    rest: bool = False,
+    periodic: bool = False,
+    objective: str = "energy",
+    longest: float = 20.0,
+    dynamics: str = "first_order",
+    inertia: Any = None,
+    velocity_bounds: Any = None,
+    start_velocity: ArrayLike | None = None,
+    end_velocity: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    intervals: int = 64,
+    starts: int = 3,
+    solver: str = "auto",
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """Minimum energy, or minimum time, under constraints; controls are continuous and linear on each interval.
+
+    Args:
+        task: the task; for minimum time its duration is the first guess, and the unit of `longest`.
+        bounds: of the controls: a number (both signs), a (low, high) pair, or {label: either}; units of u.
+        rate_bounds: of the controls' time derivatives, as bounds.
+        obstacles: `Cone`s (attitude exclusion) and `Ball`s (position), for all of the way.
+        via: (fraction of the duration, element or coordinates of the second kind) to pass through.
+        drift: (n,) constant velocity added to the controls' own: X' = X hat(drift + u).
+        rest: controls are zero at both ends.
+        periodic: controls end as they begin: a gait, whose repetition moves by the target each time.
+        objective: "energy", int sum w_i u_i^2, or "time".
+        longest: for "time": the longest duration allowed, in units of the task's.
+        dynamics: "first_order": u is a velocity; "second_order": u is a torque, or force, on the controlled components,
+            X' = X hat(xi), J xi' = ad*_xi J xi + u, from rest to rest.
+        inertia: J: a number, (n,) or (n, n), symmetric positive definite; for second order, as what follows.
+        velocity_bounds: of any component of xi, as bounds.
+        start_velocity, end_velocity: (n,) xi at the ends, zero if not given.
+        weights: (m,) positive w_i, ones if not given.
+        intervals: N, pieces of the controls.
+        starts: first guesses tried; the cheapest admissible result wins.
+        solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere; ipopt alone where the controls are periodic,
+            or do not reach all without the drift or the inertia. Or "fatrop" or "ipopt".
+        progress: called with one line a solve, and within a long one by ipopt every second. What was done is in the plan's
+            details["solves"] in any case: start, solver, iterations, objective, violation, seconds and ipopt's residuals.
+
+    Raises:
+        SteeringInputError, ShapeError: about an option.
+        SteeringError: no admissible manoeuvre found; says which limit the first guess breaks, and by how much.
+    """
+    given = {name: value for name, value in locals().items() if name not in ("task", "progress")}
+    return _run(task, Options(**given), "transcription", (), progress)
+
+
+def least_energy(
+    task: Task,
+    *,
+    weights: ArrayLike | None = None,
+    tried: tuple[str, ...] = (),
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """Minimum energy without constraints, where shooting failed."""
+    return _run(task, Options(weights=weights, starts=_FALLBACK), "optimal", tried, progress)
+
+
+def _run(
+    task: Task, asked: Options, method: str, tried: tuple[str, ...], progress: Callable[[str], None] | None
+) -> Plan:
+    started = time.perf_counter()
+    structure, numbers = pose(task, asked)
+    if blocked := ends_in_obstacles(task, numbers):
+        raise SteeringError(
+            f"steer({task.group.name}): no admissible manoeuvre; {'; '.join(blocked)}; move one of them"
+        )
+    names = _solvers(task, structure, asked)
+    candidates: list[Candidate] = []
+    building = 0.0
+    for name, shape in ((name, shape) for name in names for shape in (structure, replace(structure, guarded=True))):
+        if shape.guarded and not any(candidate.astray for candidate in candidates):
+            continue
+        began = time.perf_counter()
+        built = program(shape, name, listening=progress is not None)
+        building += time.perf_counter() - began
+        bench = Workbench(task, shape, numbers, built, progress or (lambda line: None))
+        candidates += _candidates(bench, asked.starts)
+        if any(candidate.admissible for candidate in candidates):
+            break
+    good = [candidate for candidate in candidates if candidate.admissible]
+    if not good:
+        raise SteeringError(complaint(task, structure, numbers, candidates))
+    best = min(good, key=lambda candidate: candidate.objective)
+    seconds = {"build": building, "solve": time.perf_counter() - started - building}
+    return _plan(task, structure, numbers, method, tried, candidates, best, seconds)
+
+
+def _solvers(task: Task, structure: Structure, asked: Options) -> tuple[str, ...]:
+    """fatrop cannot couple the ends, loops for ever where drift or inertia must help the controls, and can be ended only where
+    it solves a compiled program."""
+    if asked.solver != "auto":
+        return (asked.solver,)
+    if asked.periodic or not task.report.controllable or not endable(structure):
+        return ("ipopt",)
+    return ("fatrop", "ipopt")
+
+
+def _candidates(bench: Workbench, starts: int) -> list[Candidate]:
+    found = []
+    for name, v in guesses(bench.task, bench.structure, bench.numbers, starts):
+        try:
+            first = first_variables(bench.task, bench.structure, bench.numbers, v)
+            found.append(refined(bench, name, first, predicted_aim(bench, first)))
+        except ComputationError as error:
+            bench.say(f"from {name}: {error}")
+    return found
+
+
+def _plan(
+    task: Task,
+    structure: Structure,
+    numbers: Numbers,
+    method: str,
+    tried: tuple[str, ...],
+    candidates: Sequence[Candidate],
+    best: Candidate,
+    seconds: dict[str, float],
+) -> Plan:
+    values = best.values / task.duration**numbers.power
+    duration = best.duration * task.duration
+    group, flight, last = task.group, best.flight, best.solves[-1]
+    if flight is None:
+        raise ValueError("an admissible candidate has flown")
+    a, b = values[:-1], values[1:]
+    details: dict[str, Any] = {
+        "winner": f"transcription from {last.start}",
+        "tried": (
+            *tried,
+            *(f"transcription from {each.solves[-1].start}: {each.solves[-1].message}" for each in candidates),
+        ),
+        "intervals": structure.intervals,
+        "solver": last.solver,
+        "iterations": sum(solve.iterations for each in candidates for solve in each.solves),
+        "solves": tuple(solve for each in candidates for solve in each.solves),
+        "objective": "time" if structure.free_time else "energy",
+        "discretisation": "controls continuous and linear on each interval: the cost is an upper bound of the optimum's",
+        "clearances": tuple(float(np.min(obstacle.clearance(flight.X))) for obstacle in numbers.obstacles),
+        "control_peaks": tuple(float(x) for x in np.max(np.abs(values), axis=0)),
+        "drift": numbers.drift / task.duration,
+        "optimality": "a local minimum of the discretised problem, the best of the starts tried",
+        "fine_times": flight.t * task.duration,
+    }
+    error, slip = distance(group, task.target, flight.X[-1]), 0.0
+    if numbers.dynamics is not None:
+        second, xi = numbers.dynamics, flight.xi / task.duration
+        slip = float(np.linalg.norm(xi[-1] - second.ends[1] / task.duration))
+        details |= {
+            "dynamics": "second order: u is torque",
+            "inertia": second.inertia,
+            "start_velocity": second.ends[0] / task.duration,
+            "fine_velocities": xi,
+            "velocity_miss": slip,
+            "velocity_peaks": tuple(float(x) for x in np.max(np.abs(xi), axis=0)),
+        }
+    solved = max(error, slip * duration) <= task.tolerance
+    return Plan(
+        group=group,
+        target=task.target,
+        controls=tuple(group.labels[i] for i in task.controls),
+        duration=duration,
+        method=method,
+        u=piecewise_linear(group, task.controls, values, duration),
+        cost=float(np.sum(a * a + a * b + b * b)) * duration / (3 * structure.intervals),
+        X_final=flight.X[-1],
+        error=error,
+        status=Status.LOCAL if solved else Status.NOT_CONVERGED,
+        seconds=seconds,
+        details=details,
+    )

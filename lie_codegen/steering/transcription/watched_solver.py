@@ -1,0 +1,165 @@
+"""A nonlinear solver in a process of its own, because fatrop can loop for ever inside its linear algebra.
+
+No call of it can be stopped from within: the oracle is not asked again there, and no option bounds the loop. So the program, a
+compiled library, is solved by `python -m lie_codegen.steering.transcription.watched_solver`, one for this process, which is
+ended when it takes too long; the next program starts another. A request costs a tenth of a millisecond.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import TimeoutError as Late
+from contextlib import suppress
+from dataclasses import dataclass
+from threading import Lock
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.runtime.child import child_environment
+
+Array = NDArray[Any]
+
+#: Seconds for one program, and more for each variable. A solve takes a tenth of it where it takes long.
+_PATIENCE, _EACH = 4.0, 1 / 400
+#: Seconds for a new process to import what it needs.
+_START = 60.0
+
+
+class WatchedSolver:
+    """A casadi nlpsol of a compiled program, called and asked like one."""
+
+    def __init__(self, solver: str, library: str, options: Mapping[str, Any]) -> None:
+        self._request = (solver, library, dict(options))
+        self._stats: dict[str, Any] = {}
+        self._functions: dict[str, Any] = {}
+
+    def __call__(self, **numbers: Array) -> dict[str, Array]:
+        """As nlpsol: x0, p, lbx, ubx, lbg, ubg -> x, f, g; NaN where the process had to be ended.
+
+        Raises:
+            RuntimeError: as nlpsol.
+        """
+        given = {name: np.asarray(value, dtype=float) for name, value in numbers.items()}
+        seconds = _PATIENCE + _EACH * len(given["x0"])
+        answer = _worker.ask((*self._request, given), seconds)
+        if isinstance(answer, Exception):
+            raise answer
+        if answer is None:
+            self._stats = {"unified_return_status": f"ended after {seconds:.3g} s", "iter_count": -1}
+            size, rows = len(given["x0"]), len(given["lbg"])
+            return {"x": np.full(size, np.nan), "f": np.array(np.nan), "g": np.full(rows, np.nan)}
+        result, self._stats = answer
+        return dict(result)
+
+    def stats(self) -> dict[str, Any]:
+        """Of the last call: iter_count, unified_return_status."""
+        return self._stats
+
+    def get_function(self, name: str) -> Any:
+        """A function of the program: nlp_f, nlp_g."""
+        if name not in self._functions:
+            import casadi as ca
+
+            self._functions[name] = ca.external(name, self._request[1])
+        return self._functions[name]
+
+
+@dataclass(frozen=True)
+class _Running:
+    process: subprocess.Popen[bytes]
+    requests: IO[bytes]
+    answers: IO[bytes]
+
+
+class _Worker:
+    """The process, started when first asked and again after it had to be ended."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._running: _Running | None = None
+        self._reader = ThreadPoolExecutor(1, "lie_codegen-solver")
+
+    def ask(self, request: Any, seconds: float) -> Any:
+        """The answer; None if it does not come in time, or the process dies."""
+        with self._lock:
+            try:
+                running = self._started()
+                pickle.dump(request, running.requests)
+                running.requests.flush()
+                return self._answer(running, seconds)
+            except (Late, OSError, EOFError, pickle.UnpicklingError):
+                self.end()
+                return None
+
+    def _answer(self, running: _Running, seconds: float) -> Any:
+        return self._reader.submit(pickle.load, running.answers).result(seconds)
+
+    def _started(self) -> _Running:
+        running = self._running
+        if running is None or running.process.poll() is not None:
+            if not sys.executable or getattr(sys, "frozen", False):
+                raise OSError("no Python to start")
+            command = [sys.executable, "-m", "lie_codegen.steering.transcription.watched_solver"]
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=child_environment())
+            if process.stdin is None or process.stdout is None:
+                raise OSError("no pipes")
+            running = self._running = _Running(process, process.stdin, process.stdout)
+            self._answer(running, _START)
+        return running
+
+    def end(self) -> None:
+        """Ends the process, if there is one."""
+        running, self._running = self._running, None
+        if running is not None:
+            running.process.kill()
+            running.process.wait()
+            for stream in (running.requests, running.answers):
+                with suppress(OSError):
+                    stream.close()
+
+
+_worker = _Worker()
+atexit.register(_worker.end)
+
+
+def _serve() -> None:
+    """Answers requests from standard input until it ends; what solvers print goes to standard error."""
+    import casadi as ca
+
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    solvers: dict[str, Any] = {}
+
+    def answer(value: Any) -> None:
+        pickle.dump(value, answers)
+        answers.flush()
+
+    answer("ready")
+    while True:
+        try:
+            solver, library, options, numbers = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        try:
+            key = repr((solver, library, sorted(options)))
+            if key not in solvers:
+                solvers[key] = ca.nlpsol("steer", solver, library, options)
+            result = solvers[key](**numbers)
+            stats = solvers[key].stats()
+            kept = {name: stats.get(name) for name in ("iter_count", "unified_return_status")}
+            vectors = {name: np.asarray(result[name]).ravel() for name in ("x", "g")}
+            answer(({"f": np.array(float(result["f"])), **vectors}, kept))
+        except RuntimeError as error:
+            answer(error)
+
+
+if __name__ == "__main__":
+    _serve()

@@ -1,0 +1,182 @@
+"""The command line as a user runs it: exit status, stdout, stderr, files."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+from command_line import Done
+
+from lie_codegen.cli.app import main
+
+
+@pytest.fixture
+def cli(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """The command line in this process, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+
+    def invoke(*arguments: str) -> Done:
+        monkeypatch.setattr(sys, "argv", ["lie-codegen", *arguments])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            main()
+        out, err = capsys.readouterr()
+        return Done(int(stop.value.code or 0), out, err)
+
+    return invoke
+
+
+def test_list_and_show_print_one_json_object(cli, tmp_path: Path) -> None:
+    groups = json.loads(cli("list", "--json").stdout)["groups"]
+    assert {"so3", "se2", "se3", "su2", "sl2", "h3"} <= {group["name"] for group in groups}
+    shown = json.loads(cli("show", "so3", "--json").stdout)
+    assert shown["determinant_of_inverse"] == "cos(g2)"
+    assert shown["brackets"]["[w1, w2]"] == "w3"
+
+
+def test_new_writes_a_file_that_check_proves_and_generate_takes(cli, tmp_path: Path) -> None:
+    assert cli("new", "mine").returncode == 0
+    assert "proved exactly" in cli("check", "mine.toml").stdout
+    assert cli("new", "mine").returncode == 2, "an existing file is not overwritten"
+    done = cli("generate", "mine.toml", "--out", "out", "--json")
+    assert done.returncode == 0, done.stderr
+    assert {"include/mine.h", "src/mine.c", "example.c", "manifest.json"} <= set(json.loads(done.stdout)["files"])
+
+
+BAD_FILES = {
+    "not_closed": ('labels = ["a", "b"]\n[matrices]\na = [[0, 1], [0, 0]]\nb = [[0, 0], [1, 0]]', "not closed"),
+    "dependent": ('labels = ["a", "b"]\n[matrices]\na = [[0, 1], [0, 0]]\nb = [[0, 2], [0, 0]]', "linearly dependent"),
+    "jacobi": ('labels = ["a", "b", "c"]\n[brackets]\n"a,b" = { c = 1 }\n"a,c" = { a = 1 }', "(a, b, c)"),
+    "ragged": ('labels = ["a"]\n[matrices]\na = [[0, 1], [0]]', "row 2"),
+    "unknown_key": ('labels = ["a"]\ncolour = "red"\n[matrices]\na = [[0]]', "'colour'"),
+    "keyword": ('labels = ["int"]\n[matrices]\nint = [[1]]', "keyword"),
+    "expression": ('labels = ["a"]\n[matrices]\na = [["__import__(1)"]]', "column 1"),
+    "symbol": ('labels = ["a"]\n[matrices]\na = [["x + 1"]]', "column 1"),
+    "nan": ('labels = ["a"]\n[matrices]\na = [[nan]]', "matrices.a[1][1]"),
+    "both": ('labels = ["a"]\n[matrices]\na = [[1]]\n[brackets]\n', "exactly one"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", sorted(BAD_FILES))
+def test_a_bad_group_file_is_refused_with_status_2_and_one_line(cli, case: str, tmp_path: Path) -> None:
+    body, expected = BAD_FILES[case]
+    path = tmp_path / f"{case}.toml"
+    path.write_text(f'name = "{case}"\n{body}\n')
+    done = cli("check", path.name)
+    assert done.returncode == 2
+    assert expected in done.stderr
+    assert path.name in done.stderr, "the message names the file"
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--target", "0.1,0.2,0.3", "--controls", "w1"), "growth vector (1)"),
+        (("--target", "0.1,0.2", "--controls", "w1,w2"), "needs 3 real numbers"),
+        (("--target", "0.1,0.2,nan", "--controls", "w1,w2"), "'nan'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w9"), "'w9'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--duration", "0"), "duration"),
+        (("--target", "0.1,0,0.3", "--controls", "w1,w2", "--method", "four_phase"), "non-zero"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--method", "magic"), "'magic'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--method", "circle", "--bounds", "1"), "no option bounds"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--bounds", "1:2:3"), "'1:2:3'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--bounds", "w1=1,2"), "label=either"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--bounds", "w9=1"), "'w9'"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--via", "0.5"), "FRACTION@COORDINATES"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--cone", "0,0,1@1,0@0.3"), "3 real numbers"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--ball", "0,0,1@0.3"), "Ball"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--weights", "1,-2"), "weights"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--starts", "0"), "starts"),
+    ],
+)
+def test_a_bad_steering_task_is_refused_with_status_2(
+    cli, arguments: tuple[str, ...], expected: str, tmp_path: Path
+) -> None:
+    done = cli("steer", "so3", *arguments)
+    assert done.returncode == 2
+    assert expected in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_an_output_folder_that_is_not_ours_is_left_alone(cli, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    precious = tmp_path / "mine" / "thesis.txt"
+    precious.write_text("years of work")
+    done = cli("generate", "h3", "--out", "mine")
+    assert done.returncode == 2
+    assert "mine is not empty" in done.stderr
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert cli("generate", "h3", "--out", "file/inside").returncode == 2
+
+
+def test_steer_and_simulate_print_json(cli, tmp_path: Path) -> None:
+    steer = cli("steer", "h3", "--target", "0,0,1", "--controls", "x,y", "--json")
+    plan = json.loads(steer.stdout)
+    assert abs(plan["cost"] - 12.566370614359172) < 1e-4
+    simulated = cli("simulate", "so3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--end", "2*0+1")
+    assert simulated.returncode == 2, "numbers of options are plain numbers"
+    simulated = cli("simulate", "so3", "--u", "0", "--u", "0", "--u", "pi/2", "--end", "1", "--json")
+    X = json.loads(simulated.stdout)["X_final"]
+    assert max(abs(X[0][1] + 1), abs(X[1][0] - 1), abs(X[0][0])) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("method", "energy"),
+    [
+        (("--method", "circle"), 0.8 * (4 * math.pi - 0.8)),
+        (("--weights", "2,2"), 0.8 * (4 * math.pi - 0.8)),
+        (("--bounds", "w1=-9:9,w2=9", "--rest", "--via", "0.5@0.1,0.1,0.4"), None),
+    ],
+)
+def test_steer_takes_options_and_draws_a_picture(
+    cli, method: tuple[str, ...], energy: float | None, tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    task = ("--target", "0,0,0.8", "--controls", "w1,w2", "--picture", "plans/plan.png", "--json")
+    done = cli("steer", "so3", *task, *method)
+    plan = json.loads(done.stdout)
+    assert plan["error"] < 1e-7
+    if energy is not None:
+        assert plan["cost"] == pytest.approx(energy, rel=1e-6)
+    else:
+        assert plan["method"] == "transcription"
+        assert max(abs(plan["u"][0][0]), abs(plan["u"][-1][1])) < 1e-6
+    assert Path(plan["picture"]) == tmp_path / "plans" / "plan.png"
+    assert Path(plan["picture"]).stat().st_size > 20_000
+
+
+def test_average_prints_exact_coefficients_and_measures_its_order(cli, tmp_path: Path) -> None:
+    u = ("--u", "cos(t)", "--u", "sin(t)", "--u", "0")
+    done = cli("average", "so3", *u, "--order", "3", "--check", "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["exact_F"] == [["0", "0", "0"], ["0", "0", "1/2"], ["1/2", "0", "0"]]
+    assert result["check"]["passed"]
+    assert cli("average", "so3", "--u", "cos(t)").returncode == 2
+
+
+def test_a_usage_error_is_one_line_that_names_the_help(cli) -> None:
+    for arguments, words in (
+        (("steer", "so3"), "'--target'. See lie-codegen steer --help"),
+        (("nope",), "'nope'. See lie-codegen --help"),
+        (("list", "--out"), "--out"),
+    ):
+        done = cli(*arguments)
+        assert done.returncode == 2
+        assert done.stdout == ""
+        assert done.stderr.count("\n") == 1
+        assert words in done.stderr
+
+
+def test_json_has_no_nan(cli) -> None:
+    done = cli("average", "h3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--order", "3", "--check", "--json")
+    json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))

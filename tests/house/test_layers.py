@@ -1,0 +1,133 @@
+"""Imports point down only; heavy packages stay in their layers; the front door is frozen."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import lie_codegen
+
+#: From the ground up; imports point down (or stay on their floor), lazy ones and those for type checkers included.
+LAYERS = (
+    "errors", "identifiers", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
+    "control", "vehicles", "rigid_body", "averaging", "steering", "studies", "pictures", "gallery", "benchmarks", "cli",
+)  # fmt: skip
+PACKAGE = Path(lie_codegen.__file__).parent
+FILES = sorted(PACKAGE.rglob("*.py"))
+SUBJECTS = {"groups", "signals", "flow", "mechanics", "control", "vehicles", "rigid_body", "averaging", "steering"}
+#: third-party package -> layers that may import it (numpy may be imported anywhere).
+ALLOWED = {
+    "sympy": {"exact", "algebra", "kernel", *SUBJECTS, "gallery"},
+    "casadi": {"kernel", "codegen", "steering", "gallery", "benchmarks"},
+    "jinja2": {"codegen"},
+    "scipy": {*SUBJECTS, "gallery", "benchmarks"},
+    "dask": {"studies", "benchmarks"},
+    "rockit": {"benchmarks"},
+    "crocoddyl": {"benchmarks"},
+    "mpmath": {"gallery"},
+    "matplotlib": {"pictures", "gallery"},
+    "typer": {"cli"},
+    "rich": {"cli"},
+    "platformdirs": {"runtime"},
+    "filelock": {"runtime"},
+    "numpy": set(LAYERS),
+    "ziglang": {"runtime"},
+}  # fmt: skip
+
+
+def layer_of(parts: tuple[str, ...]) -> str | None:
+    first = parts[0].removesuffix(".py") if parts else ""
+    return first if first in LAYERS else None
+
+
+def imports(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.module
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_down_and_stay_in_their_layer(path: Path) -> None:
+    mine = layer_of(path.relative_to(PACKAGE).parts)
+    for name in imports(path):
+        root, *rest = name.split(".")
+        if root == "lie_codegen":
+            theirs = layer_of(tuple(rest))
+            if mine and theirs:
+                assert LAYERS.index(theirs) <= LAYERS.index(mine), f"{mine} imports {name}"
+            elif not mine:
+                assert theirs is None or path.name == "__main__.py", f"{path.name} imports {name}"
+        elif root not in sys.stdlib_module_names:
+            assert root in ALLOWED, f"{path.name} imports {name}: not a known dependency"
+            assert mine in ALLOWED[root], f"{mine} imports {name}"
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    graph: dict[str, set[str]] = {}
+    for path in FILES:
+        module = ".".join(("lie_codegen", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+        graph[module] = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("lie_codegen"):
+                inner = (f"{node.module}.{alias.name}" for alias in node.names)
+                graph[module] |= {name if is_module(name) else node.module for name in inner}
+    state: dict[str, int] = {}
+
+    def visit(module: str, trail: tuple[str, ...]) -> None:
+        assert state.get(module) != 1, " -> ".join((*trail, module))
+        if state.get(module) == 2:
+            return
+        state[module] = 1
+        for other in sorted(graph.get(module, ())):
+            visit(other, (*trail, module))
+        state[module] = 2
+
+    for module in graph:
+        visit(module, ())
+
+
+def is_module(name: str) -> bool:
+    return PACKAGE.joinpath(*name.split(".")[1:]).with_suffix(".py").is_file()
+
+
+def test_the_front_door_is_importable_and_documented() -> None:
+    for name in lie_codegen.__all__:
+        value = getattr(lie_codegen, name)
+        if callable(value):
+            assert value.__doc__, name
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    code = "import lie_codegen, sys; print([m for m in ('sympy', 'casadi', 'numpy', 'scipy', 'matplotlib') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_no_forbidden_construct_in_the_package() -> None:
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            assert not isinstance(node, ast.Assert), f"assert in {path}"
+            assert not (isinstance(node, ast.ExceptHandler) and node.type is None), f"bare except in {path}"
+            if isinstance(node, ast.Call):
+                called = ast.unparse(node.func)
+                assert called not in {"eval", "exec", "sympify", "sp.sympify", "sp.S", "parse_expr", "os.chdir"}, (
+                    f"{called} in {path}"
+                )
+                assert not called.endswith("parse_expr"), f"{called} in {path}"
+
+
+def test_every_gallery_target_is_a_function_with_a_docstring() -> None:
+    from importlib import import_module
+
+    from lie_codegen.gallery.registry import TARGETS
+
+    for target in TARGETS:
+        function = getattr(import_module(f"lie_codegen.gallery.{target.module}"), target.name)
+        assert function.__doc__, target.name
