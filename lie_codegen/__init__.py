@@ -36,6 +36,7 @@ _FRONT_DOOR = {
     "Kernel": "lie_codegen.kernel.kernel",
     "Port": "lie_codegen.kernel.kernel",
     "group_kernels": "lie_codegen.groups.kernels",
+    "nearest": "lie_codegen.groups.maps.nearest",
     "build": "lie_codegen.groups.build",
     "generate": "lie_codegen.groups.build",
     "simulate": "lie_codegen.flow.simulate",

@@ -36,6 +36,18 @@ def call(name: str, kernel_name: str, *arguments: Any) -> np.ndarray:
     return unflatten(k.outputs[0], np.array(function(name, kernel_name)(*flat)))
 
 
+@cache
+def function_of_group(group: MatrixGroup, kernel_name: str) -> ca.Function:
+    return function_of(group_kernel(group, kernel_name))
+
+
+def call_group(group: MatrixGroup, kernel_name: str, *arguments: Any) -> np.ndarray:
+    """The same of a group that has no name of its own."""
+    k = group_kernel(group, kernel_name)
+    flat = [flatten(port, value) for port, value in zip(k.inputs, arguments, strict=True)]
+    return unflatten(k.outputs[0], np.array(function_of_group(group, kernel_name)(*flat)))
+
+
 def flatten(port: Port, value: Any) -> np.ndarray:
     array = np.asarray(value, dtype=complex if port.is_complex else float)
     return np.stack([array.real, array.imag], axis=-1).ravel() if port.is_complex else array.ravel()

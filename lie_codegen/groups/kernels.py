@@ -8,6 +8,8 @@ compose(X, Y) -> Z             Z = X Y
 inverse(X) -> X_inverse
 Ad(X) -> Ad_X                  hat(Ad_X y) = X hat(y) X^{-1}
 ad(x) -> ad_x, bracket(x, y) -> z    z = ad_x y = [x, y]
+defect(X) -> defect            0 on the group, the relative distance near it
+renormalise(X) -> Y            one step back to the group
 ljac, rjac, ljac_inv, rjac_inv (x) -> J    d/dt exp(x) = hat(ljac x') exp(x) = exp(x) hat(rjac x')
 """
 
@@ -20,9 +22,11 @@ from typing import Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.maps.exponential import ad_body, exp_matrix, jacobian
 from lie_codegen.groups.maps.logarithm import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
+from lie_codegen.groups.maps.renormalise import renormalised
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman import body as wei_norman_body
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
@@ -37,6 +41,8 @@ _EXP = "the power series, summed in closed form on the spectrum of hat(x)"
 _LOG = "the inverse of exp; principal: eigenvalues of hat(x) have imaginary parts in (-pi, pi]"
 _AD = "X' = X hat(u) = hat(Ad_X u) X"
 _BRACKET = "the structure constants: [A_i, A_j] = sum_k c_ijk A_k"
+_DEFECT = "the conditions that the basis implies, found exactly"
+_NEWTON_SCHULZ = "Higham, Functions of Matrices (2008), (8.20); any form in place of 1"
 _PRODUCT = "the group's own product"
 
 
@@ -101,6 +107,22 @@ def _log(data: GroupDerivation) -> Kernel:
 
     formula = "exp(x_1 A_1 + ... + x_n A_n) = X, principal"
     return _kernel(data, "log", [_matrix(data, "X")], [_vector(data, "x")], body, formula, _LOG)
+
+
+def _defect(data: GroupDerivation) -> Kernel:
+    def body(ops: Arithmetic, X: Any) -> tuple[Any, ...]:
+        return (defect(ops, data, X),)
+
+    formula = "the largest relative violation of what every element keeps: forms, determinant, fixed entries, signs"
+    return _kernel(data, "defect", [_matrix(data, "X")], [Port("defect", ())], body, formula, _DEFECT)
+
+
+def _renormalise(data: GroupDerivation) -> Kernel:
+    def body(ops: Arithmetic, X: Any) -> tuple[Any, ...]:
+        return (renormalised(ops, data, X),)
+
+    formula = "one step towards the group: X (3 - X* X)/2 on blocks that keep a form, X det(X)^(-1/n)"
+    return _kernel(data, "renormalise", [_matrix(data, "X")], [_matrix(data, "Y")], body, formula, _NEWTON_SCHULZ)
 
 
 def _compose(data: GroupDerivation) -> Kernel:
@@ -182,6 +204,8 @@ _MAKERS: dict[str, Callable[[GroupDerivation], Kernel]] = {
     "rjac": _jacobian("right", False),
     "ljac_inv": _jacobian("left", True),
     "rjac_inv": _jacobian("right", True),
+    "defect": _defect,
+    "renormalise": _renormalise,
 }
 #: The kernels every group has.
 KERNEL_NAMES = tuple(_MAKERS)
