@@ -5,6 +5,10 @@ Two families: `InputError` (what was given is wrong; the command line exits with
 what is wrong, where, and how to mend it.
 """
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class LieCodegenError(Exception):
     """Base of all errors of this package."""
@@ -95,7 +99,29 @@ class ChartError(ComputationError):
 
 
 class SteeringError(ComputationError):
-    """The solver found no admissible manoeuvre; says what was tried."""
+    """The solver found no admissible manoeuvre; says what was tried, and proves nothing.
+
+    Attributes:
+        best: the nearest plan, or None.
+        violation: {name: by how much it misses}, or None.
+    """
+
+    def __init__(self, message: str = "", *, best: Any = None, violation: Any = None) -> None:
+        super().__init__(message)
+        self.best = best
+        self.violation = violation
+
+
+class InfeasibleError(SteeringError):
+    """No controls within the bounds reach the goal in the time: proved.
+
+    Attributes:
+        certificate: the proof, with what is needed and the most there can be.
+    """
+
+    def __init__(self, message: str = "", *, certificate: Any = None) -> None:
+        super().__init__(message)
+        self.certificate = certificate
 
 
 class MissingDependencyError(ComputationError):

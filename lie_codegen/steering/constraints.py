@@ -108,17 +108,21 @@ def limits(group: MatrixGroup, controls: Sequence[int], given: Any, what: str) -
     Raises:
         SteeringInputError: an unknown label, a lower limit above the upper one, limits that exclude 0 where 0 is needed.
     """
-    m = len(controls)
+    return box_limits([group.labels[i] for i in controls], given, what)
+
+
+def box_limits(labels: Sequence[str], given: Any, what: str) -> tuple[Array, Array]:
+    """As `limits`, of controls by their labels."""
+    m = len(labels)
     low, high = np.full(m, -np.inf), np.full(m, np.inf)
     if given is None:
         return low, high
-    labels = [group.labels[i] for i in controls]
     entries = given if isinstance(given, Mapping) else dict.fromkeys(labels, given)
     for label, value in entries.items():
         if label not in labels:
             raise SteeringInputError(f"{what}: {label!r} is no control; the controls are {', '.join(labels)}")
         pair = _pair(value, what, label)
-        low[labels.index(label)], high[labels.index(label)] = pair
+        low[list(labels).index(label)], high[list(labels).index(label)] = pair
     return low, high
 
 

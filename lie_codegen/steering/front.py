@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from numpy.typing import ArrayLike
-
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.direct.front import asks_direct, direct_plan
 from lie_codegen.steering.feedback import feedback
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by
 from lie_codegen.steering.plan import Plan
@@ -16,8 +15,8 @@ from lie_codegen.steering.task import make_task
 
 def steer(
     group: MatrixGroup,
-    target: ArrayLike,
-    controls: Sequence[str | int],
+    target: Any,
+    controls: Sequence[Any],
     duration: float,
     method: str = "auto",
     *,
@@ -28,10 +27,13 @@ def steer(
 
     Args:
         group: the group.
-        target: (d, d) group element, or (n,) coordinates of the second kind.
-        controls: labels (or positions) of the actuated basis elements.
+        target: (d, d) group element, (n,) coordinates of the second kind, or a set of goals: `Pointing`, `Position`, `Coset`,
+            `UpToPhase`.
+        controls: labels (or positions) of the actuated basis elements; for "direct" also vectors (n,), n formulas of t, functions.
         duration: seconds.
-        method: "auto": "transcription" if an option asks for it (bounds, obstacles ...), else "optimal";
+        method: "auto": "direct" for goal sets, fuel, bounds and drift, "transcription" if another option asks for it (obstacles,
+            rates, torques ...), else "optimal";
+            "direct": bounds, drift, goal sets, fuel, functions of time: reaches from many starts, then descends;
             "four_phase": closed form, section 5.2 of TR 93-59; two controls; form="single" for its single-exponential design (66);
             "circle": two controls that turn at a constant rate, the least energy within the area rule, retuned; three dimensions;
             "area_rule": Fourier controls of least energy within the averaged model, then retuned to hit the target exactly;
@@ -46,8 +48,11 @@ def steer(
         UncontrollableError: with the growth vector and the missing directions.
         SteeringInputError: an unknown method or option, or a task the method cannot do.
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
-        SteeringError: the solver found nothing admissible; says what was tried.
+        InfeasibleError: no controls within the bounds reach the target: proved, see `.certificate`.
+        SteeringError: the solver found nothing admissible; says what was tried, `.best` and `.violation`.
     """
+    if asks_direct(method, target, controls, options):
+        return direct_plan(group, target, controls, duration, tolerance, options)
     methods = {**OPEN_LOOP, "feedback": feedback}
     torques = options.get("dynamics") == "second_order"
     task = make_task(group, target, controls, duration, tolerance, torques=torques, drift=options.get("drift"))

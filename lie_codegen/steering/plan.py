@@ -21,6 +21,7 @@ class Status(Enum):
     SOLVED = "solved: the endpoint error is below the tolerance"
     APPROXIMATE = "approximate: the method reaches the target up to its own order; see .error"
     LOCAL = "solved: a local minimum of the energy, the best of the starts tried; more starts may find a better one"
+    NOT_FOUND = "not found: the nearest of the starts tried, see .violation; that none exists is not proved"
     NOT_CONVERGED = "not converged: the best found is returned, see .error; try a longer duration or more starts"
 
     def __str__(self) -> str:
@@ -61,7 +62,7 @@ class Plan:
         group, target, controls, duration: the task; controls are the labels of the actuated basis elements.
         method: the method that made it.
         u: u(t) -> (n,), vectorised.
-        cost: int_0^duration |u|^2 dt.
+        cost: int_0^duration |u|^2 dt; of objective="fuel" int sum_i w_i |u_i| dt.
         X_final: where the true system ends.
         error: |log(target^-1 X_final)|, on SO(3) the attitude error in rad.
         status: see `Status`.
@@ -81,6 +82,19 @@ class Plan:
     status: Status
     seconds: Mapping[str, float]
     details: Mapping[str, Any]
+
+    @property
+    def violation(self) -> Mapping[str, float]:
+        """{condition: by how much it is missed}: the end, and bounds or clearances where there are any."""
+        known: Mapping[str, float] = self.details.get("violation", {"end": self.error})
+        return known
+
+    def inputs(self, t: ArrayLike) -> Array:
+        """What each control does: (m,) at a time, (k, m) at (k,) times; u(t) = sum_i inputs_i b_i(t), without the drift."""
+        made = self.details.get("inputs")
+        if made is not None:
+            return np.asarray(made(t))
+        return np.asarray(self.u(t)[..., [self.group.labels.index(label) for label in self.controls]])
 
 
 class PlanOnDemand(Plan):

@@ -1,0 +1,120 @@
+"""Proofs that no controls within the bounds reach the goal in the time; anything that is not proved here is not called infeasible.
+
+With anti-Hermitian velocities a path of speed |a| in a bi-invariant norm is at least as long as the principal logarithm of
+X0^-1 T in that norm (Frobenius and spectral here, in all of U(d)). A column X e of motions with X' = X hat(a) moves at the speed
+|hat(a) e|, and so at least the straight way. Both speeds are convex in the controls: their largest value is at a vertex of the box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.goals import has_positions
+
+Array = NDArray[Any]
+
+_MOST_CONTROLS = 10
+#: Relative margin, so that rounding proves nothing.
+_SAFE = 1e-9
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A proof of infeasibility: what the goal needs is more than the bounds allow.
+
+    Attributes:
+        kind: "distance" (the whole motion), "turn" or "position".
+        need: length of the shortest way, in the unit of `kind`: a norm of the logarithm, rad, or m.
+        most: the longest way that the bounds allow in the time.
+    """
+
+    kind: str
+    need: float
+    most: float
+
+    def __str__(self) -> str:
+        what = {"distance": "the goal is", "turn": "the turn is", "position": "the position is"}[self.kind]
+        return f"{what} {self.need:.6g} away, and the bounds allow at most {self.most:.6g} in the time"
+
+
+def certificate(task: Manoeuvre) -> Certificate | None:
+    """A proof that the goal cannot be reached, the strongest found; None where there is none."""
+    speeds = _vertices(task)
+    if speeds is None:
+        return None
+    found = [each for each in (_whole(task, speeds), _columns(task, speeds)) if each is not None]
+    return max(found, key=lambda each: each.need / max(each.most, 1e-300), default=None)
+
+
+def _vertices(task: Manoeuvre) -> Array | None:
+    """hat of the velocity at the vertices of the box, (2^m, d, d); None where it has none, too many, or depends on time."""
+    if not task.system.steady or task.controls > _MOST_CONTROLS:
+        return None
+    if not np.all(np.isfinite(task.low)) or not np.all(np.isfinite(task.high)):
+        return None
+    corners = np.array(list(product(*zip(task.low, task.high, strict=True))))
+    return np.asarray(task.system.group.hat(task.system.velocity(np.zeros(len(corners)), corners)))
+
+
+def _whole(task: Manoeuvre, speeds: Array) -> Certificate | None:
+    """By a bi-invariant norm; of every variant of the goal, or there is no proof."""
+    end, basis = task.end, task.system.group.basis
+    if end.elements is None or len(end.before) or len(end.after):
+        return None
+    if not np.allclose(basis, -np.conj(np.swapaxes(basis, 1, 2)), atol=1e-12):
+        return None
+    relative = np.linalg.solve(np.broadcast_to(task.system.start, end.elements.shape), end.elements)
+    angles = np.abs(np.angle(np.linalg.eigvals(relative)))
+    best: Certificate | None = None
+    for need, most in (
+        (np.min(np.linalg.norm(angles, axis=1)), np.max(np.linalg.norm(speeds, axis=(1, 2)))),
+        (np.min(np.max(angles, axis=1)), np.max(np.linalg.norm(speeds, ord=2, axis=(1, 2)))),
+    ):
+        best = _stronger(best, _proof("distance", float(need), float(most) * task.duration))
+    return best
+
+
+def _columns(task: Manoeuvre, speeds: Array) -> Certificate | None:
+    """By the way of X e for the columns e of the goal, or of a whole element, where the velocity acts from the right."""
+    end, group, system = task.end, task.system.group, task.system
+    d, moving = group.degree, has_positions(group)
+    corner = group.basis[:, : d - 1, : d - 1] if moving else group.basis
+    rigid = not group.is_complex and np.allclose(corner, -np.swapaxes(corner, 1, 2), atol=1e-12)
+    if not rigid or system.right or len(end.before) or len(end.after):
+        return None
+    best: Certificate | None = None
+    if end.elements is None:
+        # pointing, position: one column, whose rows the left matrix picks and scales
+        e = end.right[:, 0]
+        scale = float(np.max(np.abs(end.left)))
+        way = float(np.linalg.norm(end.left @ system.start @ e - end.values[0][:, 0])) / scale
+        pointing = e[-1] == 0 if moving else True
+        most = float(np.max(np.linalg.norm(speeds @ e, axis=1))) * task.duration
+        if pointing:
+            way = 2 * float(np.arcsin(min(1.0, way / 2)))
+        return _proof("turn" if pointing else "position", way, most)
+    if moving:
+        way = float(np.linalg.norm(end.elements[0][:-1, -1] - system.start[:-1, -1]))
+        most = float(np.max(np.linalg.norm(speeds[:, :-1, -1], axis=1))) * task.duration
+        best = _stronger(best, _proof("position", way, most))
+        turn = system.start[:-1, :-1].T @ end.elements[0][:-1, :-1]
+        angle = float(np.max(np.abs(np.angle(np.linalg.eigvals(turn)))))
+        fastest = float(np.max(np.linalg.norm(speeds[:, :-1, :-1], ord=2, axis=(1, 2)))) * task.duration
+        best = _stronger(best, _proof("turn", angle, fastest))
+    return best
+
+
+def _proof(kind: str, need: float, most: float) -> Certificate | None:
+    return Certificate(kind, need, most) if need > most * (1 + _SAFE) + _SAFE else None
+
+
+def _stronger(a: Certificate | None, b: Certificate | None) -> Certificate | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return max(a, b, key=lambda each: each.need / max(each.most, 1e-300))

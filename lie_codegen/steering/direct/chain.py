@@ -1,0 +1,113 @@
+"""The end of a chain of exponentials and its exact derivative by every control, in numpy, many lanes at once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.steering.direct.programme import Goal, Programme
+
+Array = NDArray[Any]
+
+
+def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:
+    """Residual r (L, q), reduced residual (L, n) and its derivative J (L, n, S m) at controls u (L, S, m)."""
+    lanes, slots, m = u.shape
+    p = programme
+    entry = np.broadcast_to(p.entry, (lanes, p.entry.shape[1]))
+    b = p.directions[entry]
+    driven = p.share[:, :1] * u[:, p.slot] + p.share[:, 1:] * u[:, np.minimum(p.slot + 1, slots - 1)]
+    E, dE = exponentials(p.drifts[entry] + np.einsum("lki,lkixy->lkxy", driven, b), b)
+    K, d = E.shape[1], E.shape[-1]
+    before, after = np.empty_like(E), np.empty_like(E)
+    X = np.broadcast_to(p.start, E[:, 0].shape).astype(E.dtype)
+    for k in range(K):
+        before[:, k] = X
+        X = X @ E[:, k]
+    tail = np.broadcast_to(np.eye(d), X.shape).astype(E.dtype)
+    for k in range(K - 1, -1, -1):
+        after[:, k] = tail
+        tail = E[:, k] @ tail
+    moved = (goal.left @ before)[:, :, None] @ dE @ (after @ goal.right)[:, :, None]
+    r, reduce = residual(p, goal, X)
+    rows = np.einsum("lnq,lkiq->lnki", reduce, flat(moved))
+    J = np.zeros((slots, lanes, rows.shape[1], m))
+    moving = np.moveaxis(rows, 2, 0)
+    for k, (slot, (p_k, q_k)) in enumerate(zip(p.slot, p.share, strict=True)):
+        J[slot] += p_k * moving[k]
+        if q_k != 0:
+            J[slot + 1] += q_k * moving[k]
+    return r, np.einsum("lnq,lq->ln", reduce, r), np.moveaxis(J, 0, 2).reshape(lanes, -1, slots * m)
+
+
+def residual(p: Programme, goal: Goal, X: Array) -> tuple[Array, Array]:
+    """The residual (L, q) and (L, n, q) rows that reduce it: an orthonormal basis of what motions of X change.
+
+    With D = dr/dx (q, n) along X hat(x) and D'D = L L', the rows are L^-1 D'.
+    """
+    here = goal.left @ X @ goal.right
+    slopes = (goal.left @ X)[:, None] @ p.basis @ goal.right
+    value = goal.value
+    if goal.free_phase:
+        overlap = np.sum(np.conj(value) * here, axis=(1, 2))
+        turn = overlap / np.abs(overlap)
+        value = turn[:, None, None] * value
+        rate = np.imag(np.sum(np.conj(goal.value)[:, None] * slopes, axis=(2, 3)) / overlap[:, None])
+        slopes = slopes - 1j * rate[..., None, None] * value[:, None]
+    D = flat(slopes)
+    gram = D @ np.swapaxes(D, 1, 2)
+    n = gram.shape[1]
+    gram = gram + (1e-13 * np.trace(gram, axis1=1, axis2=2) / n + 1e-300)[:, None, None] * np.eye(n)
+    return flat(here - value), np.linalg.solve(np.linalg.cholesky(gram), D)
+
+
+def flat(matrices: Array) -> Array:
+    """(..., p, s) -> (..., q): real and imaginary parts of the entries side by side."""
+    rows = matrices.reshape(*matrices.shape[:-2], -1)
+    return np.concatenate([rows.real, rows.imag], axis=-1) if np.iscomplexobj(rows) else rows
+
+
+def exponentials(a: Array, b: Array) -> tuple[Array, Array]:
+    """exp(a) (..., d, d) and its derivatives (..., m, d, d) along b: Taylor's polynomial by Horner's rule, then squarings."""
+    size = float(np.max(np.sum(np.abs(a), axis=-2), initial=0.0))
+    halvings = max(0, math.ceil(math.log2(size / 1.5))) if size > 1.5 else 0
+    a, b = a / 2**halvings, b / 2**halvings
+    terms = degree(size / 2**halvings)
+    d = a.shape[-1]
+    eye = np.eye(d)
+    E = np.broadcast_to(eye, a.shape) + a / terms
+    dE = b / terms
+    wide = a[..., None, :, :]
+    for j in range(terms - 1, 0, -1):
+        dE = (b @ E[..., None, :, :] + wide @ dE) / j
+        E = eye + a @ E / j
+    for _ in range(halvings):
+        dE = E[..., None, :, :] @ dE + dE @ E[..., None, :, :]
+        E = E @ E
+    return E, dE
+
+
+def degree(size: float) -> int:
+    """Terms after which Taylor's series of exp is exact to rounding for matrices of that norm."""
+    left, j = size, 1
+    while left > 1e-17 and j < 40:
+        j += 1
+        left *= size / j
+    return max(2, j)
+
+
+def end(programme: Programme, u: Array) -> Array:
+    """X (L, d, d) at the end of the chain."""
+    lanes, slots, _ = u.shape
+    p = programme
+    entry = np.broadcast_to(p.entry, (lanes, p.entry.shape[1]))
+    driven = p.share[:, :1] * u[:, p.slot] + p.share[:, 1:] * u[:, np.minimum(p.slot + 1, slots - 1)]
+    E = expm(p.drifts[entry] + np.einsum("lki,lkixy->lkxy", driven, p.directions[entry]))
+    X = np.broadcast_to(p.start, E[:, 0].shape)
+    for k in range(E.shape[1]):
+        X = X @ E[:, k]
+    return np.asarray(X)

@@ -1,0 +1,156 @@
+"""The search in C: templates/direct_core.c with the sizes of a group, built once and cached; nothing is built per problem."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.backend import load_library
+from lie_codegen.runtime.sources import build_source
+from lie_codegen.steering.direct.numpy_search import NumpySearch
+from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
+
+Array = NDArray[Any]
+
+_CORE = "direct_core.c"
+_SIZES = "direct_sizes.h"
+_ALIGNED = 64
+
+
+@lru_cache(maxsize=32)
+def machine(group: MatrixGroup, controls: int) -> Machine:
+    """What searches for a group with that many controls: compiled, or numpy where there is no compiler.
+
+    Groups of the same sizes share one library.
+
+    Raises:
+        CompileError: with the command and the compiler's own words.
+    """
+    parts = 2 if group.is_complex else 1
+    sizes = (
+        f"/* Sizes of a group: D x D matrices, PARTS doubles an entry, dimension N, M controls. */\n"
+        f"#define PARTS {parts}\nenum {{ D = {group.degree}, N = {group.dim}, M = {controls} }};\n"
+    )
+
+    def files() -> dict[str, str]:
+        from lie_codegen.codegen.templates import template_folder
+
+        return {_CORE: (template_folder() / _CORE).read_text(encoding="utf-8"), _SIZES: sizes}
+
+    library = build_source(files, _CORE, namespace="direct_core", definition=sizes)
+    return NumpySearch() if library is None else CompiledSearch(load_library(library), group.degree, parts, group.dim)
+
+
+class _Programme(ctypes.Structure):
+    """As `programme` in the C text."""
+
+    _fields_ = (
+        *[
+            (name, ctypes.c_int)
+            for name in (
+                "exponentials", "slots", "rows", "entry_lanes", "free_phase", "fuel", "reach_iterations", "descend_iterations",
+            )
+        ],
+        *[(name, ctypes.c_double) for name in ("enough", "damping", "relative")],
+        *[
+            (name, ctypes.c_void_p)
+            for name in (
+                "start", "right", "value", "basis", "drifts", "directions", "share", "low", "high", "weight", "mass",
+                "entry", "slot",
+            )
+        ],
+    )  # fmt: skip
+
+
+class CompiledSearch:
+    """The functions of the library; the interpreter lock is released while they run."""
+
+    compiled = True
+
+    def __init__(self, library: ctypes.CDLL, degree: int, parts: int, dim: int) -> None:
+        self._degree, self._dim = degree, dim
+        self._kind: Any = complex if parts == 2 else float
+        void, count = ctypes.c_void_p, ctypes.c_int
+        self._memory = library["direct_memory"]
+        self._memory.argtypes, self._memory.restype = (void,), ctypes.c_size_t
+        self._functions = {}
+        for name, arrays in (("reach", 4), ("linearise", 5), ("descend", 6)):
+            function = library[f"direct_{name}"]
+            function.argtypes, function.restype = (void, count, *[void] * arrays), None
+            self._functions[name] = function
+
+    def reach(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
+        """See `Machine`."""
+        controls, size, used = _copied(u), np.empty(len(u)), np.zeros(len(u), np.intc)
+        self._run("reach", programme, goal, settings, controls, size, used)
+        return Reached(controls, size, np.full(len(u), np.nan), np.zeros((len(u), self._dim)), used)
+
+    def descend(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
+        """See `Machine`."""
+        controls, size, used = _copied(u), np.empty(len(u)), np.zeros(len(u), np.intc)
+        cost, multipliers = np.empty(len(u)), np.zeros((len(u), self._dim))
+        self._run("descend", programme, goal, settings, controls, size, cost, multipliers, used)
+        return Reached(controls, size, cost, multipliers, used)
+
+    def linearise(self, programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:
+        """See `Machine`."""
+        lanes = len(u)
+        size, r = np.empty(lanes), np.empty((lanes, self._dim))
+        J = np.empty((lanes, self._dim, programme.low.size))
+        self._run("linearise", programme, goal, Settings(), _copied(u), size, r, J)
+        return size, r, J
+
+    def _run(
+        self, name: str, programme: Programme, goal: Goal, settings: Settings, controls: Array, *others: Array
+    ) -> None:
+        record, kept = self._record(programme, goal, settings)
+        address = ctypes.addressof(record)
+        memory = np.empty(self._memory(address) + _ALIGNED // 8)
+        lent = memory.ctypes.data + -memory.ctypes.data % _ALIGNED
+        self._functions[name](address, len(controls), *[a.ctypes.data for a in (controls, *others)], lent)
+        del kept
+
+    def _record(self, p: Programme, goal: Goal, settings: Settings) -> tuple[_Programme, dict[str, Array]]:
+        """The C record, and the arrays it points to: goals are padded to square matrices, which changes no residual."""
+        arrays: dict[str, Any] = {
+            "start": self._square(goal.left @ p.start),
+            "right": self._square(goal.right),
+            "value": self._square(goal.value),
+            **{name: self._entries(getattr(p, name)) for name in ("basis", "drifts", "directions")},
+            **{name: _copied(getattr(p, name)) for name in ("share", "low", "high", "weight", "mass")},
+            "entry": np.ascontiguousarray(p.entry, dtype=np.intc),
+            "slot": np.ascontiguousarray(p.slot, dtype=np.intc),
+        }
+        record = _Programme(
+            exponentials=len(p.slot),
+            slots=len(p.mass),
+            rows=len(p.drifts),
+            entry_lanes=len(p.entry),
+            free_phase=int(goal.free_phase),
+            fuel=int(settings.fuel),
+            reach_iterations=settings.reach_iterations,
+            descend_iterations=settings.descend_iterations,
+            enough=settings.enough,
+            damping=settings.damping,
+            relative=settings.relative,
+            **{name: array.ctypes.data for name, array in arrays.items()},
+        )
+        return record, arrays
+
+    def _entries(self, matrices: Array) -> Array:
+        return np.ascontiguousarray(matrices, dtype=self._kind)
+
+    def _square(self, matrices: Array) -> Array:
+        d = self._degree
+        padded = np.zeros((*matrices.shape[:-2], d, d), dtype=self._kind)
+        padded[..., : matrices.shape[-2], : matrices.shape[-1]] = matrices
+        return padded
+
+
+def _copied(values: Array) -> Array:
+    return np.array(values, dtype=float, order="C")

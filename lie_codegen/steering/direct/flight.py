@@ -1,0 +1,75 @@
+"""Where controls really lead: an own integration of the system, which stops at every breakpoint, to accept or refuse a plan by.
+
+On each piece X' = X hat(a(t)) is followed by Magnus steps of order six on three Gauss points (Blanes, Casas and Ros, BIT 40 (2000) 434,
+with the signs of a velocity that acts from the right); the steps are halved until the states agree.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.steering.direct.inputs import Drive
+
+Array = NDArray[Any]
+
+_AGREE = 1e-13
+_MOST = 256
+_GAUSS = np.array([0.5 - math.sqrt(15) / 10, 0.5, 0.5 + math.sqrt(15) / 10])
+
+
+def fly(drive: Drive, parts: int = 1) -> tuple[Array, Array]:
+    """Times (K parts + 1,) and states (K parts + 1, d, d) under the inputs of `drive`, drift included."""
+    knots = drive.inputs.knots
+    steady = drive.system.steady and bool(np.all(drive.inputs.first == drive.inputs.last))
+    if steady:
+        return _states(drive, knots, parts, 1)  # one exponential a piece is exact
+    steps, (t, before) = 1, _states(drive, knots, parts, 1)
+    while True:
+        steps *= 2
+        _, after = _states(drive, knots, parts, steps)
+        scale = max(1.0, float(np.max(np.abs(after))))
+        off = float(np.max(np.abs(after - before)))
+        # the difference is the error of the coarser run; that of the finer one is 2^6 times smaller
+        if not off > 64 * _AGREE * scale or steps >= _MOST:
+            return t, after
+        before = after
+
+
+def _states(drive: Drive, knots: Array, parts: int, steps: int) -> tuple[Array, Array]:
+    """States at every part of every piece, `steps` Magnus steps a part."""
+    system = drive.system
+    inner = np.arange(parts * steps) / (parts * steps)
+    t0 = (knots[:-1, None] + np.diff(knots)[:, None] * inner).ravel()
+    h = np.repeat(np.diff(knots) / (parts * steps), parts * steps)
+    sampled = Drive(system, drive.inputs, True)
+    a = [system.group.hat(h[:, None] * sampled(t0 + c * h)) for c in _GAUSS]
+    if system.right:
+        a = [np.swapaxes(each, 1, 2) for each in a]
+    E = expm(_magnus(*a))
+    X = np.asarray(system.start, dtype=E.dtype)
+    X = X.T if system.right else X
+    states = [X]
+    for k, step in enumerate(E, start=1):
+        X = X @ step
+        if k % steps == 0:
+            states.append(X)
+    found = np.array(states)
+    return np.append(t0[::steps], knots[-1]), np.swapaxes(found, 1, 2) if system.right else found
+
+
+def _magnus(a1: Array, a2: Array, a3: Array) -> Array:
+    """The exponent of one step for X' = X a; a(t) times the step's length at the three Gauss points."""
+    alpha1, alpha2, alpha3 = a2, math.sqrt(15) / 3 * (a3 - a1), 10 / 3 * (a3 - 2 * a2 + a1)
+    first = _bracket(alpha2, alpha1)  # [alpha1, alpha2] with the sign of the other side
+    second = _bracket(2 * alpha3 + first, alpha1) / -60
+    third = _bracket(alpha2 + second, -20 * alpha1 - alpha3 + first) / 240
+    return np.asarray(alpha1 + alpha3 / 12 + third)
+
+
+def _bracket(x: Array, y: Array) -> Array:
+    return np.asarray(x @ y - y @ x)

@@ -1,0 +1,178 @@
+"""The search in numpy, where there is no compiler: the same steps as templates/direct_core.c, many lanes at once.
+
+Stage 1 reaches: Levenberg and Marquardt's steps on the residual, projected on the bounds, in the n reduced rows of the goal, so
+that systems are n by n whatever the number of controls. Stage 2 descends: the proximal step of the linearised problem, by
+semismooth Newton's method on its dual, then a few undamped steps of stage 1 to restore the goal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.steering.direct.chain import linearise
+from lie_codegen.steering.direct.programme import Goal, Programme, Reached, Settings, chosen
+
+Array = NDArray[Any]
+
+_LEAST, _MOST = 1e-13, 1e8
+_ROUNDING = 1e-13
+
+
+@dataclass
+class _Lanes:
+    """Controls (L, C) and what is known there: residual norm (L,), reduced residual (L, n) and its derivative (L, n, C)."""
+
+    u: Array
+    size: Array
+    r: Array
+    J: Array
+
+    def take(self, rows: Array, other: _Lanes, picked: Array) -> None:
+        """Lanes `picked` of another become the lanes `rows` of this."""
+        for each in fields(self):
+            getattr(self, each.name)[rows] = getattr(other, each.name)[picked]
+
+
+@dataclass(frozen=True)
+class _Box:
+    low: Array
+    high: Array
+    weight: Array
+    mass: Array
+
+    @staticmethod
+    def of(p: Programme) -> _Box:
+        return _Box(p.low.ravel(), p.high.ravel(), p.weight.ravel(), np.repeat(p.mass, p.low.shape[1]))
+
+    def objective(self, fuel: bool, u: Array) -> Array:
+        w = self.weight * self.mass
+        return np.asarray(np.abs(u) @ w if fuel else u**2 @ w / 2)
+
+
+class NumpySearch:
+    """The search of any group."""
+
+    compiled = False
+
+    def linearise(self, programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:
+        """See `Machine`."""
+        at = _at(programme, goal, u.reshape(len(u), -1))
+        return at.size, at.r, at.J
+
+    def reach(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
+        """See `Machine`."""
+        box = _Box.of(programme)
+        at = _at(programme, goal, np.clip(u.reshape(len(u), -1), box.low, box.high))
+        used = _arrive(programme, goal, box, at, settings.reach_iterations, settings.enough, settings.damping)
+        return Reached(at.u.reshape(u.shape), at.size, box.objective(settings.fuel, at.u), np.zeros_like(at.r), used)
+
+    def descend(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
+        """See `Machine`."""
+        box = _Box.of(programme)
+        at = _at(programme, goal, np.clip(u.reshape(len(u), -1), box.low, box.high))
+        rho, quiet, used = np.ones(len(u)), np.zeros(len(u)), np.zeros(len(u), int)
+        y = np.zeros_like(at.r)
+        best = box.objective(settings.fuel, at.u)
+        enough = 100 * settings.enough
+        for _ in range(settings.descend_iterations):
+            act = np.flatnonzero((quiet < 2) & (rho < 1e6))
+            if not len(act):
+                break
+            here = _Lanes(at.u[act], at.size[act], at.r[act], at.J[act])
+            v, multipliers = _proximal(box, settings.fuel, here, y[act], rho[act])
+            part, aim = chosen(programme, goal, act)
+            trial = _at(part, aim, v)
+            _arrive(part, aim, box, trial, 12, settings.enough, 1e-9)
+            cost = box.objective(settings.fuel, trial.u)
+            better = (trial.size < enough) & (cost < best[act])
+            small = better & (best[act] - cost <= settings.relative * best[act])
+            quiet[act] = np.where(small, quiet[act] + 1, np.where(better, 0, quiet[act]))
+            rho[act] = np.where(better, np.maximum(rho[act] / 3, 1e-6), rho[act] * 4)
+            rows = act[better]
+            at.take(rows, trial, better)
+            y[rows], best[rows] = multipliers[better], cost[better]
+            used[act] += 1
+        return Reached(at.u.reshape(u.shape), at.size, best, y, used)
+
+
+def _at(p: Programme, goal: Goal, u: Array) -> _Lanes:
+    full, r, J = linearise(p, goal, u.reshape(len(u), *p.low.shape))
+    return _Lanes(u, np.linalg.norm(full, axis=1), r, J)
+
+
+def _arrive(
+    p: Programme, goal: Goal, box: _Box, at: _Lanes, iterations: int, enough: float, damping: float
+) -> NDArray[np.int_]:
+    """Damped steps of all lanes towards the goal, in place; steps taken by each."""
+    damped = np.full(len(at.u), damping)
+    used = np.zeros(len(at.u), int)
+    for _ in range(iterations):
+        act = np.flatnonzero((at.size > enough) & (damped < _MOST))
+        if not len(act):
+            break
+        here = _Lanes(at.u[act], at.size[act], at.r[act], at.J[act])
+        part, aim = chosen(p, goal, act)
+        trial = _at(part, aim, np.clip(here.u + _damped_step(box, here, damped[act]), box.low, box.high))
+        better = trial.size < here.size
+        at.take(act[better], trial, better)
+        damped[act] = np.where(better, np.maximum(damped[act] / 5, _LEAST), damped[act] * 6)
+        used[act] += 1
+    return used
+
+
+def _damped_step(box: _Box, at: _Lanes, damped: Array) -> Array:
+    """-J'(J J' + damping)^-1 r, a control at a bound that pulls outwards left where it is."""
+    pull = np.einsum("lnc,ln->lc", at.J, at.r)
+    free = ~(((at.u <= box.low) & (pull > 0)) | ((at.u >= box.high) & (pull < 0)))
+    J = at.J * (free / box.mass)[:, None, :]
+    K = J @ np.swapaxes(at.J, 1, 2)
+    n = K.shape[1]
+    K += (damped * np.trace(K, axis1=1, axis2=2) / n + 1e-300)[:, None, None] * np.eye(n)
+    return np.asarray(-np.einsum("lnc,ln->lc", J, np.linalg.solve(K, at.r[..., None])[..., 0]))
+
+
+def _proximal(box: _Box, fuel: bool, at: _Lanes, y: Array, rho: Array) -> tuple[Array, Array]:
+    """min objective(v) + rho/2 |v - u|^2 over the box with J v = J u - r; v and the multipliers y, from a first guess of y."""
+    want = np.einsum("lnc,lc->ln", at.J, at.u) - at.r
+    scale = rho[:, None]
+
+    def primal(y: Array) -> tuple[Array, Array, Array]:
+        z = np.einsum("lnc,ln->lc", at.J, y) / box.mass
+        if fuel:
+            s, t = at.u + z / scale, box.weight / scale
+            v = np.sign(s) * np.maximum(np.abs(s) - t, 0)
+            rate = np.where(np.abs(s) > t, 1 / scale, 0)
+        else:
+            rate = 1 / (box.weight + scale)
+            v = (z + scale * at.u) * rate
+        rate = np.where((v > box.low) & (v < box.high), rate, 0)
+        v = np.clip(v, box.low, box.high)
+        return v, rate, np.einsum("lnc,lc->ln", at.J, v) - want
+
+    trace = np.einsum("lnc,lnc->l", at.J, at.J / box.mass)
+    v, rate, F = primal(y)
+    for _ in range(30):
+        norm = np.linalg.norm(F, axis=1)
+        open_ = norm > _ROUNDING
+        if not np.any(open_):
+            break
+        H = (at.J * (rate / box.mass)[:, None, :]) @ np.swapaxes(at.J, 1, 2)
+        H += (1e-10 * trace + 1e-300)[:, None, None] * np.eye(H.shape[1])
+        step = -np.linalg.solve(H, F[..., None])[..., 0]
+        moved = np.zeros(len(y), bool)
+        for half in range(8):
+            found = np.linalg.norm(primal(y + 0.5**half * step)[2], axis=1)
+            falls = open_ & (found < norm)
+            y = np.where(falls[:, None], y + 0.5**half * step, y)
+            moved |= falls
+            open_ &= ~falls
+            if not np.any(open_):
+                break
+        v, rate, F = primal(y)
+        if not np.any(moved):
+            break
+    return v, y

@@ -1,0 +1,42 @@
+"""What controls and drift can reach at all: the brackets of both must fill the algebra, or the directions that the goal asks for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import UncontrollableError
+from lie_codegen.steering.accessibility import bracket_of, closure, independent
+from lie_codegen.steering.direct.system import System
+from lie_codegen.steering.goals import End
+
+Array = NDArray[Any]
+
+_SAMPLES = 7
+
+
+def require_reach(system: System, duration: float, end: End) -> None:
+    """Nothing, if brackets of controls and drift, with the motions the goal leaves free, fill the algebra.
+
+    The test is made on directions at a few times, so that controls that turn count as all they turn through. Goals that prescribe
+    a part of X alone (a line of sight, a position) are not refused: less than the algebra may do.
+
+    Raises:
+        UncontrollableError: with the dimensions reached.
+    """
+    group = system.group
+    t = np.linspace(0.0, duration, 1 if system.steady else _SAMPLES)
+    rows = [system.directions_at(t).reshape(-1, group.dim), system.drift.at(t), end.before, end.after]
+    first = independent(np.vstack(rows[:2]))
+    filled = closure(first, bracket_of(group.algebra), independent)
+    if len(filled) == group.dim or end.elements is None or len(end.before) or len(end.after):
+        return
+    missing = np.eye(group.dim) - filled.T @ filled
+    names = [label for label, row in zip(group.labels, missing, strict=True) if np.linalg.norm(row) > 1e-9]
+    helped = ", even with the drift" if np.any(system.drift.at(t)) else ""
+    raise UncontrollableError(
+        f"steer({group.name}): not controllable{helped}: the brackets of {', '.join(system.labels)} fill {len(filled)} of "
+        f"{group.dim} dimensions; nothing moves along {', '.join(names)}; add a control in a missing direction"
+    )

@@ -1,0 +1,133 @@
+"""Stages 1 and 2: rounds of many starts that only try to arrive, then a descent from each that did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
+from lie_codegen.steering.direct.starts import starts, with_free_slots
+
+Array = NDArray[Any]
+
+#: Starts of a round that must arrive before another round is not tried.
+_PLENTY = 4
+#: Least starts for each of a goal's variants (the phases of a gate).
+_EACH = 4
+_AGREEING = 0.01
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How hard to search; iterations and starts, never seconds.
+
+    Attributes:
+        starts: first guesses a round.
+        rounds: most rounds.
+        pieces: of the controls.
+        seed: of the guesses.
+        settings: of the machine.
+    """
+
+    starts: int
+    rounds: int
+    pieces: int
+    seed: int
+    settings: Settings
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search found.
+
+    Attributes:
+        u: (S, m) of the cheapest lane that arrived, or of the nearest where none did.
+        variant: of the goal, for that lane.
+        residual: at its goal.
+        arrived: whether it is there.
+        cost: its objective.
+        starts, reached, agree: starts tried, starts that arrived, starts that ended within 1 % of the cheapest.
+        tried: one line a round.
+    """
+
+    u: Array = field(repr=False)
+    variant: int
+    residual: float
+    arrived: bool
+    cost: float
+    starts: int
+    reached: int
+    agree: int
+    tried: tuple[str, ...]
+
+
+def search(
+    task: Manoeuvre,
+    programme: Programme,
+    machine: Machine,
+    budget: Budget,
+    guesses: Array | None,
+    say: Callable[[str], None],
+) -> Found:
+    """The cheapest controls found on the programme's slots; guesses (k, S - free, m) are starts beside the others."""
+    settings = budget.settings
+    enough = threshold(task, settings)
+    tried: list[str] = []
+    kept: list[tuple[Array, Array, Array]] = []
+    total = 0
+    variants = len(task.end.values)
+    for round_ in range(budget.rounds):
+        lanes = max(budget.starts, variants * _EACH)
+        u = starts(task, budget.pieces, lanes, budget.seed, round_)
+        if guesses is not None and round_ == 0:
+            u = np.concatenate([guesses, u])
+        variant = np.arange(len(u)) % variants
+        u = with_free_slots(task, u, budget.seed + round_)
+        found = machine.reach(programme, task.goal(variant), u, settings)
+        total += len(u)
+        there = found.size <= enough
+        tried.append(f"round {round_ + 1}, seed {budget.seed}: {int(np.sum(there))} of {len(u)} starts reach the goal")
+        say(tried[-1])
+        kept.append((found.u, found.size, variant))
+        if sum(int(np.sum(size <= enough)) for _, size, _ in kept) >= min(_PLENTY, budget.starts):
+            break
+    u, size, variant = (np.concatenate(each) for each in zip(*kept, strict=True))
+    arrived = np.flatnonzero(size <= enough)
+    if not len(arrived):
+        nearest = int(np.nanargmin(size))
+        return Found(u[nearest], int(variant[nearest]), float(size[nearest]), False, np.inf, total, 0, 0, tuple(tried))
+    lower = machine.descend(programme, task.goal(variant[arrived]), u[arrived], settings)
+    say(f"descent from {len(arrived)} starts: {int(np.max(lower.used))} steps at most")
+    return _best(lower, variant[arrived], total, tuple(tried))
+
+
+def threshold(task: Manoeuvre, settings: Settings) -> float:
+    """Residual at which a lane is there: rounding grows with the size of the goal."""
+    return 1e3 * settings.enough * max(1.0, float(np.max(np.abs(task.end.values))))
+
+
+def _best(lower: Reached, variant: Array, total: int, tried: tuple[str, ...]) -> Found:
+    best = int(np.argmin(lower.cost))
+    cost = float(lower.cost[best])
+    agree = int(np.sum(lower.cost <= cost * (1 + _AGREEING) + 1e-12))
+    return Found(
+        lower.u[best], int(variant[best]), float(lower.size[best]), True, cost, total, len(variant), agree, tried
+    )
+
+
+def once_more(machine: Machine, programme: Programme, goal: Goal, u: Array, settings: Settings) -> tuple[Array, float]:
+    """Controls (S, m) near u that reach the goal, cheaper if that is possible; the residual."""
+    reached = machine.reach(programme, goal, u[None], replace(settings, damping=1e-9))
+    lower = machine.descend(programme, goal, reached.u, settings)
+    return lower.u[0], float(lower.size[0])
+
+
+def restored(machine: Machine, programme: Programme, goal: Goal, u: Array, settings: Settings) -> tuple[Array, float]:
+    """Controls (S, m) near u that reach the goal, and the residual."""
+    reached = machine.reach(programme, goal, u[None], replace(settings, damping=1e-9))
+    return reached.u[0], float(reached.size[0])

@@ -1,0 +1,67 @@
+"""First controls for the search: none, white noise, and smooth waves; the same for the same seed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.flow.metric import element_coordinates
+from lie_codegen.steering.direct.assemble import Manoeuvre
+
+Array = NDArray[Any]
+
+#: Sizes of the waves, in units of the bounds: larger ones start at the bounds and stay there (measured on two-qubit gates).
+_SIZES = (0.3, 0.15, 0.5, 0.05)
+_WAVES = 4
+
+
+def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> Array:
+    """(lanes, pieces, m): in turn smooth and white; the very first is zero, moved into the bounds."""
+    rng = np.random.default_rng([seed, round_])
+    middle, half = _box(task)
+    s = (np.arange(pieces) + 0.5) / pieces
+    waves = np.cos(np.pi * np.outer(s, np.arange(_WAVES)))
+    found = []
+    for lane in range(lanes):
+        size = _SIZES[(lane // 2 + round_) % len(_SIZES)]
+        smooth = waves @ rng.uniform(-1, 1, (_WAVES, task.controls))
+        white = rng.uniform(-1, 1, (pieces, task.controls))
+        # a motion to one side needs a mean: it is drawn apart from the wave
+        mean = rng.uniform(-1, 1, task.controls)
+        if lane == 0 and round_ == 0:
+            found.append(np.zeros((pieces, task.controls)))
+        elif lane % 2:
+            found.append(middle + size * half * white)
+        else:
+            found.append(middle + size * half * (smooth + mean))
+    return np.clip(np.array(found), task.low, task.high)
+
+
+def with_free_slots(task: Manoeuvre, u: Array, seed: int) -> Array:
+    """The controls (lanes, S, m) with slots for the free motions of the goal: none in the first lane, then any."""
+    before, after = task.free_slots
+    rng = np.random.default_rng([seed, before, after])
+    free = rng.uniform(-np.pi, np.pi, (len(u), before + after, u.shape[2]))
+    free[0] = 0
+    return np.concatenate([free[:, :before], u, free[:, before:]], axis=1)
+
+
+def _box(task: Manoeuvre) -> tuple[Array, Array]:
+    """(m,) middle and half width of the limits; where there is none, what reaches the target in the time, doubled."""
+    reach = 2 * np.pi
+    elements = task.end.elements
+    if elements is not None:
+        reach += float(np.linalg.norm(element_coordinates(task.system.group, elements[0])))
+    else:
+        reach += float(np.linalg.norm(task.end.values[0]))
+    usual = 2 * reach / task.duration
+    low = np.where(np.isfinite(task.low), task.low, np.where(np.isfinite(task.high), task.high - 2 * usual, -usual))
+    high = np.where(np.isfinite(task.high), task.high, np.where(np.isfinite(task.low), task.low + 2 * usual, usual))
+    # very wide limits are as good as none
+    low, high = (
+        np.maximum(low, np.minimum(-10 * usual, high - 20 * usual)),
+        np.minimum(high, np.maximum(10 * usual, low + 20 * usual)),
+    )
+    return (low + high) / 2, (high - low) / 2

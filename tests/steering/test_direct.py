@@ -1,0 +1,266 @@
+"""method="direct": reached goals, least costs, goal sets, honest refusals; against DOP853, published values and certificates."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import lie_codegen as lc
+from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
+from lie_codegen.steering.direct.chain import end as chain_end
+from lie_codegen.steering.direct.compiled import machine
+from lie_codegen.steering.direct.method import manoeuvre
+from lie_codegen.steering.direct.numpy_search import NumpySearch
+from lie_codegen.steering.direct.programme import Settings
+
+SX, SY, SZ = np.array([[0, 1], [1, 0]]), np.array([[0, -1j], [1j, 0]]), np.diag([1, -1])
+HADAMARD = (SX + SZ) / np.sqrt(2)
+CNOT = np.eye(4, dtype=complex)[[0, 1, 3, 2]]
+
+
+def end_of_flight(plan: Any, drift: Any = None, start: Any = None, right: bool = False) -> np.ndarray:
+    """Where the true system ends, by DOP853 from breakpoint to breakpoint."""
+    group, d = plan.group, plan.group.degree
+    fall = (
+        (lambda t: np.zeros(group.dim)) if drift is None else drift if callable(drift) else lambda t: np.asarray(drift)
+    )
+    X = np.eye(d, dtype=group.basis.dtype) if start is None else np.asarray(start, dtype=group.basis.dtype)
+    knots = np.concatenate([[0.0], plan.u.breakpoints, [plan.duration]])
+    for a, b in pairwise(knots):
+        inside = lambda t, a=a, b=b: min(max(t, a + 1e-12 * (b - a)), b - 1e-12 * (b - a))  # noqa: E731
+
+        def rate(t: float, x: np.ndarray, inside: Any = inside) -> np.ndarray:
+            A = group.hat(plan.u(inside(t)) + fall(t))
+            Y = x.reshape(d, d)
+            return (A @ Y if right else Y @ A).ravel()
+
+        X = solve_ivp(rate, (a, b), X.ravel(), method="DOP853", rtol=1e-10, atol=1e-12).y[:, -1].reshape(d, d)
+    return X
+
+
+QUBIT: dict[str, Any] = {"drift": [0, 0, 1], "bounds": {"sx": 1, "sy": 0.5}}
+
+
+@pytest.mark.parametrize(("gate", "least"), [(-1j * HADAMARD, 2.40915), (1j * HADAMARD, 2.89735), (1j * SX, 1.64536)])
+def test_bounded_qubit_gates_cost_what_shooting_found(gate: np.ndarray, least: float) -> None:
+    plan = lc.steer(lc.group("su2"), gate, ("sx", "sy"), 6.0, **QUBIT)
+    assert plan.method == "direct"
+    assert plan.status.name == "LOCAL"
+    assert plan.cost == pytest.approx(least, rel=2e-5)
+    assert np.max(np.abs(end_of_flight(plan, [0, 0, 1]) - gate)) < 1e-8
+    peaks = np.max(np.abs(plan.inputs(np.linspace(0, 6, 5001))), axis=0)
+    assert np.all(peaks <= [1 + 1e-12, 0.5 + 1e-12])
+    assert plan.details["agree"] >= 3
+    assert plan.violation == {"end": plan.error, "bound": 0.0}
+
+
+def test_right_invariant_plans_are_flown_by_schroedingers_equation() -> None:
+    start = expm(lc.group("su2").hat([0.3, -0.4, 0.2]))
+    plan = lc.steer(lc.group("su2"), 1j * HADAMARD, ("sx", "sy"), 6.0, equation="right", start=start, **QUBIT)
+    assert np.max(np.abs(end_of_flight(plan, [0, 0, 1], start, right=True) - 1j * HADAMARD)) < 1e-8
+    assert np.max(np.abs(end_of_flight(plan, [0, 0, 1], start) - 1j * HADAMARD)) > 1e-2
+
+
+def test_goal_sets_cost_what_transversal_shooting_found() -> None:
+    so3, se2 = lc.group("so3"), lc.group("se2")
+    d = (0.48, -0.6, 0.64)
+    plan = lc.steer(so3, lc.Pointing(axis=(0, 0, 1), direction=d), ("w1", "w2"), 1.0)
+    assert plan.cost == pytest.approx(np.arccos(d[2]) ** 2, rel=1e-6)
+    plan = lc.steer(so3, lc.Pointing(axis=(1, 0, 0), direction=d), ("w1", "w2"), 1.0)
+    assert plan.cost == pytest.approx(2.473659, rel=2e-5)
+    np.testing.assert_allclose(end_of_flight(plan)[:, 0], d, atol=1e-8)
+    for point, least in (((0, 1), 5.161601), ((-1, 0.5), 1.880744), ((0.5, 2), 9.288260)):
+        plan = lc.steer(se2, lc.Position(point), ("omega", "vx"), 1.0)
+        assert plan.cost == pytest.approx(least, rel=2e-5)
+        np.testing.assert_allclose(end_of_flight(plan)[:2, 2], point, atol=1e-8)
+
+
+def test_cosets_leave_free_what_they_say() -> None:
+    so3 = lc.group("so3")
+    T, start = expm(so3.hat([0.4, -0.3, 0.7])), expm(so3.hat([0.1, 0.2, 0.3]))
+    right = lc.steer(so3, lc.Coset(T, free=("w3",)), ("w1", "w2"), 1.0)
+    # X in T exp(a w3): the third column is T's
+    np.testing.assert_allclose(end_of_flight(right)[:, 2], T[:, 2], atol=1e-8)
+    pointing = lc.steer(so3, lc.Pointing((0, 0, 1), T[:, 2]), ("w1", "w2"), 1.0)
+    assert right.cost == pytest.approx(pointing.cost, rel=1e-6)
+    left = lc.steer(so3, lc.Coset(T, free=("w1",), side="left"), ("w1", "w2"), 1.0, start=start)
+    np.testing.assert_allclose(end_of_flight(left, start=start)[0], T[0], atol=1e-8)
+
+
+def test_fuel_is_bang_off_bang_and_as_cheap_as_words() -> None:
+    so3 = lc.group("so3")
+    plan = lc.steer(so3, expm(so3.hat([0.4, -0.3, 0.9])), ("w1", "w2"), 5.0, bounds=1, objective="fuel")
+    assert plan.cost == pytest.approx(3.182836, rel=2e-5)
+    t = np.linspace(0, 5, 200_001)
+    assert np.trapezoid(np.sum(np.abs(plan.inputs(t)), axis=1), t) == pytest.approx(plan.cost, rel=1e-3)
+    assert np.mean(np.abs(plan.inputs(t)) < 1e-9) > 0.2
+
+
+def test_a_turning_control_is_a_constant_one_seen_from_a_turning_frame() -> None:
+    so3, w = lc.group("so3"), 1.3
+    T0 = expm(so3.hat([0.4, -0.3, 0.7]))
+    turning = lc.steer(so3, T0, (lambda t: (np.cos(w * t), np.sin(w * t), 0.0),), 6.0)
+    texts = lc.steer(so3, T0, (("cos(1.3*t)", "sin(1.3*t)", 0),), 6.0)
+    still = lc.steer(so3, T0 @ expm(so3.hat([0, 0, 6 * w])), ("w1",), 6.0, drift=[0, 0, w])
+    assert turning.cost == pytest.approx(1.40429, rel=2e-5)
+    assert still.cost == pytest.approx(1.40429, rel=2e-5)
+    assert texts.cost == turning.cost
+    t = np.linspace(0.1, 5.9, 7)
+    expected = texts.inputs(t) * np.column_stack([np.cos(w * t), np.sin(w * t), 0 * t])
+    np.testing.assert_allclose(texts.u(t), expected, atol=1e-12)
+    assert np.max(np.abs(end_of_flight(texts) - T0)) < 1e-8
+
+
+def test_a_gate_up_to_its_phase_names_the_phase_it_took() -> None:
+    su2 = lc.group("su2")
+    plan = lc.steer(su2, lc.UpToPhase(HADAMARD), ("sx", "sy"), 6.0, **QUBIT)
+    assert plan.cost == pytest.approx(2.40915, rel=2e-5)
+    np.testing.assert_allclose(plan.X_final, np.exp(1j * plan.details["phase"]) * HADAMARD, atol=1e-9)
+    assert plan.details["fidelity"] == pytest.approx(1, abs=1e-12)
+
+
+def test_cnot_with_a_coupling_drift_is_found_from_every_start() -> None:
+    su4 = lc.group("su4")
+
+    def two(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return su4.vee(-0.5j * np.kron(a, b))
+
+    local = [two(s, np.eye(2)) for s in (SX, SY)] + [two(np.eye(2), s) for s in (SX, SY)]
+    plan = lc.steer(su4, lc.UpToPhase(CNOT), local, 6.0, drift=two(SZ, SZ), bounds=4, pieces=30, starts=8)
+    assert plan.cost == pytest.approx(8.6643, rel=1e-4)
+    assert plan.details["reached"] >= 12
+    phase = np.exp(1j * plan.details["phase"])
+    # the pieces of the search, played by exponentials
+    pulses = plan.details["pieces"]
+    X = np.eye(4, dtype=complex)
+    for u in pulses.first:
+        X = X @ expm(su4.hat(6.0 / 30 * (two(SZ, SZ) + u @ np.array(local))))
+    np.testing.assert_allclose(X, phase * CNOT, atol=1e-9)
+
+
+def test_random_feasible_targets_are_reached() -> None:
+    rng = np.random.default_rng(3)
+    reached = 0
+    systems = [
+        ("so3", ("w1",), [0, 0, 1]),
+        ("se2", ("omega",), [0, 1, 0]),
+        ("su3", ("l1", "l3", "l7"), None),
+        ("se3", ("w1", "w2", "w3"), [0, 0, 0, 1, 0, 0]),
+    ]
+    for name, controls, drift in systems:
+        group = lc.group(name)
+        rows = [group.labels.index(label) for label in controls]
+        for _ in range(3):
+            target = np.eye(group.degree, dtype=group.basis.dtype)
+            for _ in range(37):
+                u = np.zeros(group.dim) if drift is None else np.array(drift, dtype=float)
+                u[rows] += rng.uniform(-1, 1, len(rows))
+                target = target @ expm(group.hat(5.0 / 37 * u))
+            plan = lc.steer(group, target, controls, 5.0, method="direct", drift=drift, bounds=1, polish=False)
+            reached += plan.error < 1e-9
+    assert reached == 12
+
+
+def test_refusals_prove_or_say_that_they_do_not() -> None:
+    su2 = lc.group("su2")
+    with pytest.raises(lc.errors.InfeasibleError) as proved:
+        lc.steer(su2, 1j * SX, ("sx", "sy"), 1.0, bounds=0.5)
+    # half a turn (pi) at |u| <= sqrt(1/2) rad/s in a second: the angles of the matrix are half as large
+    assert proved.value.certificate.need > proved.value.certificate.most
+    with pytest.raises(lc.errors.SteeringError) as open_:
+        lc.steer(su2, np.eye(2), ("sx", "sy"), 6.0, starts=4, rounds=2, seed=5, **QUBIT)
+    assert not isinstance(open_.value, lc.errors.InfeasibleError)
+    assert open_.value.best.status.name == "NOT_FOUND"
+    assert open_.value.violation["end"] > 0.1
+    assert "longer" not in str(open_.value)
+    with pytest.raises(lc.errors.InfeasibleError):
+        lc.steer(lc.group("se2"), lc.Position((3.0, 0.0)), ("omega",), 2.0, drift=[0, 1, 0], bounds=1)
+    with pytest.raises(lc.errors.UncontrollableError):
+        lc.steer(su2, 1j * SX, ("sz",), 1.0, bounds=1)
+
+
+def test_certificates_never_refuse_what_was_made_from_admissible_controls() -> None:
+    rng = np.random.default_rng(8)
+    from lie_codegen.steering.direct.certificates import certificate
+
+    for name, controls in (
+        ("so3", ("w1", "w2")),
+        ("se2", ("omega", "vx")),
+        ("su3", ("l1", "l4", "l8")),
+        ("se3", ("w1", "w2", "v1")),
+    ):
+        group = lc.group(name)
+        rows = [group.labels.index(label) for label in controls]
+        for _ in range(20):
+            target = np.eye(group.degree, dtype=group.basis.dtype)
+            sign = rng.choice([-1, 1], len(rows))
+            for _ in range(5):
+                u = np.zeros(group.dim)
+                u[rows] = sign * rng.uniform(0.9, 1.0)
+                target = target @ expm(group.hat(0.3 * u))
+            assert certificate(manoeuvre(group, target, controls, 1.5, None, 1.0, None, None, "left")) is None
+
+
+def test_the_same_seed_gives_the_same_answer_and_guesses_are_starts() -> None:
+    su2 = lc.group("su2")
+    one, two = (lc.steer(su2, 1j * SX, ("sx", "sy"), 6.0, seed=7, **QUBIT) for _ in range(2))
+    np.testing.assert_array_equal(one.inputs([1.0, 2.0]), two.inputs([1.0, 2.0]))
+    again = lc.steer(su2, 1j * SX, ("sx", "sy"), 6.0, guess=one, starts=1, rounds=1, **QUBIT)
+    assert again.details["reached"] >= 1
+    assert again.cost == pytest.approx(one.cost, rel=1e-5)
+    for guess in (lambda t: (0.3 * np.cos(t), 0.1), np.full((7, 2), 0.1)):
+        assert lc.steer(su2, 1j * SX, ("sx", "sy"), 6.0, guess=guess, **QUBIT).details["starts"] == 17
+    with pytest.raises(lc.errors.ShapeError, match="guess"):
+        lc.steer(su2, 1j * SX, ("sx", "sy"), 6.0, guess=np.zeros((7, 3)), **QUBIT)
+    copy = pickle.loads(pickle.dumps(one))
+    np.testing.assert_array_equal(copy.u([1.0, 2.0]), one.u([1.0, 2.0]))
+
+
+def _task(name: str, controls: tuple[str, ...], **options: Any) -> Manoeuvre:
+    group = lc.group(name)
+    target = expm(group.hat(0.4 * np.cos(np.arange(group.dim))))
+    goal = options.pop("goal", target)
+    given = {"drift": None, "bounds": 1.0, "weights": None, "start": None, "equation": "left", **options}
+    return manoeuvre(group, goal, controls, 5.0, **given)
+
+
+@pytest.mark.parametrize("name", ["so3", "se2", "su3", "se3"])
+@pytest.mark.parametrize("linear", [False, True])
+def test_derivatives_are_exact_and_the_two_machines_agree(name: str, linear: bool) -> None:
+    group = lc.group(name)
+    task = _task(name, group.labels[:2], drift=0.3 * np.sin(np.arange(group.dim)))
+    programme = linear_pieces(task, 6, 2.0) if linear else constant_pieces(task, 6)
+    goal, rng = task.goal(np.zeros(3, int)), np.random.default_rng(1)
+    u = rng.uniform(-1, 1, (3, *programme.low.shape))
+    c, numpy_ = machine(group, 2), NumpySearch()
+    for one, two in zip(c.linearise(programme, goal, u), numpy_.linearise(programme, goal, u), strict=True):
+        np.testing.assert_allclose(one, two, atol=1e-11)
+    # at the goal, where the rows that reduce the residual stand still, central differences
+    goal = replace(goal, value=chain_end(programme, u) @ goal.right)
+    J = c.linearise(programme, goal, u)[2]
+    e = 1e-5
+    for slot, i in ((0, 0), (3, 1), (5, 0)):
+        up, down = u.copy(), u.copy()
+        up[:, slot, i] += e
+        down[:, slot, i] -= e
+        slope = (c.linearise(programme, goal, up)[1] - c.linearise(programme, goal, down)[1]) / (2 * e)
+        np.testing.assert_allclose(J[:, :, slot * 2 + i], slope, atol=1e-8)
+
+
+def test_numpy_finds_what_the_compiled_search_finds() -> None:
+    task = _task("so3", ("w1", "w2"), drift=[0, 0, 0.5])
+    programme = constant_pieces(task, 24)
+    goal, u = task.goal(np.zeros(5, int)), np.random.default_rng(2).uniform(-0.3, 0.3, (5, 24, 2))
+    costs = []
+    for solver in (machine(task.system.group, 2), NumpySearch()):
+        reached = solver.reach(programme, goal, u, Settings())
+        assert np.all(reached.size < 1e-10)
+        costs.append(np.min(solver.descend(programme, goal, reached.u, Settings()).cost))
+    assert costs[0] == pytest.approx(costs[1], rel=1e-6)
