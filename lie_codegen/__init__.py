@@ -45,6 +45,7 @@ _FRONT_DOOR = {
     "Position": "lie_codegen.steering.goals",
     "Coset": "lie_codegen.steering.goals",
     "UpToPhase": "lie_codegen.steering.goals",
+    "ocp": "lie_codegen.steering.ocp.front",
     "Cone": "lie_codegen.steering.constraints",
     "Ball": "lie_codegen.steering.constraints",
     "plot_plan": "lie_codegen.pictures.plot_plan",

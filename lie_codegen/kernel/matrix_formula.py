@@ -28,15 +28,36 @@ _MAX_EXPONENT = 16
 Value = Any  # sp.Expr or sp.ImmutableMatrix
 
 
+def formula(
+    text: str,
+    matrices: Mapping[str, sp.ImmutableMatrix],
+    names: Mapping[str, sp.Expr],
+    values: Mapping[str, Value],
+    *,
+    hermitian: bool = False,
+) -> Value:
+    """What a text denotes, a scalar or a matrix; with `hermitian` norm2 sums the squared moduli of complex entries.
+
+    Raises:
+        ExpressionError: outside the grammar, an unknown name, or shapes that do not fit.
+    """
+    return _Parser(text, matrices, names, values, hermitian=hermitian).parse()
+
+
 def scalar_formula(
-    text: str, matrices: Mapping[str, sp.ImmutableMatrix], names: Mapping[str, sp.Expr], values: Mapping[str, Value]
+    text: str,
+    matrices: Mapping[str, sp.ImmutableMatrix],
+    names: Mapping[str, sp.Expr],
+    values: Mapping[str, Value],
+    *,
+    hermitian: bool = False,
 ) -> sp.Expr:
     """The scalar a text denotes.
 
     Raises:
         ExpressionError: outside the grammar, an unknown name, shapes that do not fit, or a matrix as the result.
     """
-    value = _Parser(text, matrices, names, values).parse()
+    value = formula(text, matrices, names, values, hermitian=hermitian)
     if isinstance(value, sp.MatrixBase):
         if value.shape == (1, 1):
             return value[0, 0]
@@ -67,9 +88,13 @@ class _Parser(TokenStream):
         matrices: Mapping[str, sp.ImmutableMatrix],
         names: Mapping[str, sp.Expr],
         values: Mapping[str, Any],
+        *,
+        hermitian: bool = False,
     ) -> None:
         super().__init__(text, "'")
+        self.hermitian = hermitian
         self.matrices = matrices
+        self.values = sorted(values)
         self.names: dict[str, Value] = {**names, "pi": sp.pi, **values}
         for name in ("X", "Xd"):
             if name in matrices:
@@ -172,9 +197,14 @@ class _Parser(TokenStream):
     def value(self, token: Token) -> Value:
         if token.text in self.names:
             return self.names[token.text]
-        raise self.error(
-            f"no name {token.text!r}; known: X, Xd, their entries (X11, Xd11, Xi11, Xdi11) and parameters", token
-        )
+        known = ", ".join(["X", *(["Xd"] if "Xd" in self.names else []), *self.values, "entries as X11"])
+        raise self.error(f"no name {token.text!r}; known: {known}", token)
+
+    def square(self, entry: sp.Expr) -> sp.Expr:
+        if not self.hermitian:
+            return entry**2
+        re, im = entry.as_real_imag()
+        return re**2 + im**2
 
     def call(self, token: Token) -> Value:
         argument = self.sum()
@@ -183,7 +213,7 @@ class _Parser(TokenStream):
             if not isinstance(argument, sp.MatrixBase):
                 raise self.error(f"{token.text} takes a matrix", token)
             if token.text == "norm2":
-                return sp.Add(*[entry**2 for entry in argument.flat()])
+                return sp.Add(*[self.square(entry) for entry in argument.flat()])
             if argument.rows != argument.cols:
                 raise self.error(f"{token.text} takes a square matrix", token)
             return argument.trace() if token.text == "tr" else (argument - argument.T) / 2

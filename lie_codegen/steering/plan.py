@@ -24,6 +24,10 @@ class Status(Enum):
     NOT_FOUND = "not found: the nearest of the starts tried, see .violation; that none exists is not proved"
     NOT_CONVERGED = "not converged: the best found is returned, see .error; try a longer duration or more starts"
 
+    ADMISSIBLE = "admissible: all conditions are met, the iteration limit was reached before the cost settled"
+    NOT_ADMISSIBLE = "not admissible: a condition is violated; see .worst and .violation"
+    DIVERGED = "diverged: the first trajectory is not finite; give another guess"
+
     def __str__(self) -> str:
         return self.value
 

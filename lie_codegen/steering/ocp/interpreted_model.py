@@ -1,0 +1,158 @@
+"""The model's functions in CasADi's interpreter, and the steps that are chained from their stages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.steering.ocp.model import Model
+from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
+
+Array = NDArray[Any]
+#: Arguments, their derivatives and the stages' own derivatives, the total and its derivative, the right Jacobian.
+Chain = tuple[list[Array], list[Array], list[Array], Array, Array, Array]
+
+
+class InterpretedModel:
+    """Numbers in, numbers out."""
+
+    def __init__(self, data: ProblemData, model: Model) -> None:
+        self.data, self.sizes = data, model.sizes
+        self.functions = {function.name(): function for function in model.functions}
+        self.second_order = "model_move_hessian" in self.functions
+        self.a, self.b, self.c = data.tableau
+        h = data.duration / data.intervals
+        self.nodes = tuple((c, weight * h) for c, weight in QUADRATURES[data.quadrature])
+        self.needs_control = np.array(model.needs_control, dtype=bool)
+
+    def _run(self, name: str, *arguments: Any) -> list[Array]:
+        function = self.functions[name]
+        padded = [a if np.size(a) else np.zeros(function.numel_in(i)) for i, a in enumerate(arguments)]
+        results = function.call([np.asarray(a, dtype=float) for a in padded])
+        return [np.array(result.full()).ravel() for result in results]
+
+    def packed(self, X: Array, z: Array) -> Array:
+        """A state as stored."""
+        rows, columns = np.array(varying_entries(self.data.group)).T
+        entries = np.ascontiguousarray(X[rows, columns])
+        flat = entries.view(float) if self.data.group.is_complex else entries
+        return np.concatenate([flat, z])
+
+    def given(self, k: int) -> Array:
+        """Rows of g that no control can change: at the start those of the state alone."""
+        return ~self.needs_control if k == 0 else np.zeros(len(self.needs_control), dtype=bool)
+
+    def step(self, x: Array, u: Array, p: Array, t: float, h: float) -> Array:
+        """x_{k+1}."""
+        k, total = np.zeros(self.sizes.nx), np.zeros(self.sizes.nx)
+        for a, b, c in zip(self.a, self.b, self.c, strict=True):
+            k = self._run("model_stage", x, h * a * k, u, p, t + c * h)[0]
+            total = total + h * b * k
+        return self._run("model_move", x, total)[0]
+
+    def linear_step(self, x: Array, u: Array, p: Array, t: float, h: float) -> tuple[Array, Array, Chain]:
+        """x_{k+1}, (nv, nv) the derivative of (x_{k+1}, u) by (d, u), and what its second order needs."""
+        n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
+        y, Y = np.zeros(nx), np.zeros((nx, nx + m))
+        total, slope = np.zeros(nx), np.zeros((nx, nx + m))
+        arguments: list[Array] = []
+        slopes: list[Array] = []
+        stages: list[Array] = []
+        k, K = np.zeros(nx), np.zeros((nx, nx + m))
+        for a, b, c in zip(self.a, self.b, self.c, strict=True):
+            y, Y = h * a * k, h * a * K
+            k, flat = self._run("model_stage_jacobian", x, y, u, p, t + c * h)
+            S = flat.reshape(nx, 2 * n + nx - n + m)
+            K = np.hstack([S[:, :n], S[:, 2 * n :]]) + S[:, n : n + nx] @ Y
+            total, slope = total + h * b * k, slope + h * b * K
+            arguments.append(y)
+            slopes.append(Y)
+            stages.append(S)
+        Ad, right = (flat.reshape(n, n) for flat in self._run("model_move_jacobian", total))
+        J = np.zeros((nx + m, nx + m))
+        J[:n], J[n:nx] = right @ slope[:n], slope[n:]
+        J[:n, :n] += Ad
+        J[n:, n:] += np.eye(nx - n + m)
+        following = self._run("model_move", x, total)[0]
+        return following, J, (arguments, slopes, stages, total, slope, right)
+
+    def curvature(self, x: Array, u: Array, p: Array, t: float, h: float, chain: Chain, mu: Array) -> Array:
+        """(nv, nv) Hessian of mu . F."""
+        n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
+        arguments, slopes, stages, total, slope, right = chain
+        direct = np.hstack([np.eye(n), np.zeros((n, nx - n + m))])
+        ends = self._run("model_move_hessian", total, mu)[0].reshape(2 * n, 2 * n)
+        L = np.vstack([direct, slope[:n]])
+        H = L.T @ ends @ L
+        nu = np.concatenate([right.T @ mu[:n], mu[n:]])
+        back = np.zeros(nx)
+        others = np.hstack([np.zeros((nx - n + m, n)), np.eye(nx - n + m)])
+        for s in range(len(self.a) - 1, -1, -1):
+            weights = h * self.b[s] * nu + back
+            size = 2 * n + nx - n + m
+            time = t + self.c[s] * h
+            curve = self._run("model_stage_hessian", x, arguments[s], u, p, time, weights)[0].reshape(size, size)
+            rest = others.copy()
+            rest[: nx - n] += slopes[s][n:]
+            L = np.vstack([direct, slopes[s][:n], rest])
+            H = H + L.T @ curve @ L
+            back = h * self.a[s] * stages[s][:, n : n + nx].T @ weights
+        return np.asarray(H)
+
+    def difference(self, x: Array, other: Array) -> Array:
+        """(nx,) d with x (+) d = other."""
+        return self._run("model_difference", x, other)[0]
+
+    def cost(self, x: Array, u: Array, p: Array, t: float) -> float:
+        """l."""
+        return float(self._run("model_cost", x, u, p, t)[0][0])
+
+    def cost_model(self, x: Array, u: Array, p: Array, t: float, *, exact: bool) -> tuple[float, Array, Array]:
+        """l, its gradient and its Hessian (or J'J of residuals)."""
+        value, g, H = self._run("model_cost_exact" if exact else "model_cost_square", x, u, p, t)
+        return float(value[0]), g, H.reshape(len(g), len(g))
+
+    def end_cost(self, x: Array, p: Array, t: float) -> float:
+        """phi."""
+        return float(self._run("model_end_cost", x, p, t)[0][0])
+
+    def end_cost_model(self, x: Array, p: Array, t: float, nx: int, *, exact: bool) -> tuple[float, Array, Array]:
+        """phi, its gradient and its Hessian."""
+        value, v, P = self._run("model_end_cost_exact" if exact else "model_end_cost_square", x, p, t)
+        return float(value[0]), v, P.reshape(nx, nx)
+
+    def path(self, x: Array, u: Array, p: Array, t: float) -> Array:
+        """g."""
+        return self._run("model_path", x, u, p, t)[0] if self.sizes.path else np.zeros(0)
+
+    def path_jacobian(self, x: Array, u: Array, p: Array, t: float, nv: int) -> tuple[Array, Array]:
+        """g and its derivative."""
+        if not self.sizes.path:
+            return np.zeros(0), np.zeros((0, nv))
+        g, G = self._run("model_path_jacobian", x, u, p, t)
+        return g, G.reshape(len(g), nv)
+
+    def path_hessian(self, x: Array, u: Array, p: Array, t: float, a: Array, nv: int) -> Array:
+        """Hessian of a . g."""
+        return self._run("model_path_hessian", x, u, p, t, a)[0].reshape(nv, nv)
+
+    def end(self, x: Array, p: Array, t: float) -> Array:
+        """What holds at the end: g of the state alone, then e."""
+        return self._run("model_end", x, p, t)[0] if self._ends() else np.zeros(0)
+
+    def end_jacobian(self, x: Array, p: Array, t: float, nx: int) -> tuple[Array, Array]:
+        """It and its derivative."""
+        if not self._ends():
+            return np.zeros(0), np.zeros((0, nx))
+        c, C = self._run("model_end_jacobian", x, p, t)
+        return c, C.reshape(len(c), nx)
+
+    def end_hessian(self, x: Array, p: Array, t: float, a: Array, nx: int) -> Array:
+        """Hessian of a times it."""
+        return self._run("model_end_hessian", x, p, t, a)[0].reshape(nx, nx)
+
+    def _ends(self) -> int:
+        return self.sizes.end_path + self.sizes.end

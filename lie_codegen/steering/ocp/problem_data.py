@@ -1,0 +1,190 @@
+"""The data of an optimal control problem: what `lc.ocp` checked, as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.linear import Matrix, Vector, ad_star, dot, matvec, plus, scaled
+from lie_codegen.steering.ocp.layout import Layout
+from lie_codegen.steering.ocp.terms import Point, Scope, Term
+
+Rows = tuple[tuple[float, ...], ...]
+
+#: Nodes and weights on [0, 1] of the quadrature of the cost.
+QUADRATURES: dict[str, tuple[tuple[float, float], ...]] = {
+    "left": ((0.0, 1.0),),
+    "trapezoid": ((0.0, 0.5), (1.0, 0.5)),
+    "simpson": ((0.0, 1 / 6), (0.5, 4 / 6), (1.0, 1 / 6)),
+}
+#: Explicit tableaus in which each stage needs only the one before it: (a, b, c).
+INTEGRATORS: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = {
+    "rkmk4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6), (0.0, 0.5, 0.5, 1.0)),
+    "midpoint": ((0.0, 0.5), (0.0, 1.0), (0.0, 0.5)),
+    "exact": ((0.0,), (1.0,), (0.0,)),
+}
+
+
+@dataclass(frozen=True)
+class Affine:
+    """xi = B u + drift.
+
+    Attributes:
+        columns: (n, m) B.
+        drift: (n,).
+    """
+
+    columns: Rows
+    drift: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """xi is a state: I xi' = ad*_xi I xi - drag xi + force + B u. Bullo and Murray, CIT-CDS 97-003, (10).
+
+    Attributes:
+        inertia, inverse: (n, n) I and its inverse.
+        drag: (n, n).
+        columns: (n, m) B.
+        force: further body force, or None.
+    """
+
+    inertia: Rows
+    inverse: Rows
+    drag: Rows
+    columns: Rows
+    force: Term | None
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Rows of g <= 0, or of e = 0.
+
+    Attributes:
+        name: what it is called where it is violated.
+        term: its formula or kernel.
+        sense: "g" or "e".
+    """
+
+    name: str
+    term: Term
+    sense: str
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A part of a cost.
+
+    Attributes:
+        term: its formula or kernel.
+        is_residual: the cost is |r|^2 / 2 of its entries.
+    """
+
+    term: Term
+    is_residual: bool
+
+
+@dataclass(frozen=True)
+class ProblemData:
+    """min sum l + phi subject to X' = X hat(xi), z' = f, lower <= u <= upper, g <= 0, e = 0."""
+
+    name: str
+    group: MatrixGroup
+    inputs: Layout
+    states: Layout
+    parameters: Layout
+    velocity: Affine | SecondOrder | tuple[Term, ...]
+    rates: tuple[tuple[str, tuple[Term, ...]], ...]
+    stage_cost: tuple[Cost, ...]
+    terminal_cost: tuple[Cost, ...]
+    constraints: tuple[Condition, ...]
+    terminal: tuple[Condition, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    duration: float
+    intervals: int
+    quadrature: str
+    integrator: str
+
+    @property
+    def scope(self) -> Scope:
+        """The names of a stage."""
+        return Scope(self.group, (self.inputs, self.states, self.parameters))
+
+    @property
+    def end_scope(self) -> Scope:
+        """The names at the end: no control acts there."""
+        return self.scope.without_inputs()
+
+    @property
+    def is_invariant(self) -> bool:
+        """xi depends on the controls alone, and there are no other states: a step is one exponential, exactly."""
+        return isinstance(self.velocity, Affine) and not self.states.shapes
+
+    @property
+    def tableau(self) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        """Of the integrator; of one stage where that is exact."""
+        return INTEGRATORS["exact" if self.is_invariant else self.integrator]
+
+    def xi(self, at: Point) -> Vector:
+        """(n,) body velocity."""
+        if isinstance(self.velocity, Affine):
+            moved = matvec(_constants(self.velocity.columns), at.values["input"])
+            return plus(moved, list(self.velocity.drift))
+        if isinstance(self.velocity, SecondOrder):
+            return list(at.values["state"][self.states.slices()["xi"][0]])
+        return [entry for term in self.velocity for entry in self.scope.evaluate(term, at, "any", "velocity")]
+
+    def rate(self, at: Point) -> Vector:
+        """(q,) rates of the states, in their order."""
+        by_name: dict[str, Vector] = {
+            name: [entry for term in terms for entry in self.scope.evaluate(term, at, "any", f"rates of {name}")]
+            for name, terms in self.rates
+        }
+        if isinstance(self.velocity, SecondOrder):
+            by_name["xi"] = self._acceleration(self.velocity, at)
+        return [entry for name in self.states.names for entry in by_name[name]]
+
+    def _acceleration(self, law: SecondOrder, at: Point) -> Vector:
+        xi = self.xi(at)
+        total = ad_star(at.ops, self.group.algebra, xi, matvec(_constants(law.inertia), xi))
+        total = plus(total, matvec(_constants(law.columns), at.values["input"]))
+        total = plus(total, scaled(-1, matvec(_constants(law.drag), xi)))
+        if law.force is not None:
+            total = plus(total, self.scope.evaluate(law.force, at, "any", "force"))
+        return matvec(_constants(law.inverse), total)
+
+    def cost(self, parts: tuple[Cost, ...], at: Point, where: str) -> tuple[Any, Vector]:
+        """The scalar parts' sum, and all residuals; the whole cost is the sum plus half the residuals' square."""
+        scope = self.scope if "input" in at.values else self.end_scope
+        total: Any = 0
+        residual: Vector = []
+        for part in parts:
+            entries = scope.evaluate(part.term, at, "parts" if part.is_residual else "scalar", where)
+            if part.is_residual:
+                residual += entries
+            else:
+                total = total + entries[0]
+        return total, residual
+
+    def rows(self, conditions: tuple[Condition, ...], at: Point) -> Vector:
+        """Entries of conditions, one after the other."""
+        scope = self.scope if "input" in at.values else self.end_scope
+        kinds = {"g": "any", "e": "parts"}  # a complex entry is zero when its parts are; it is not below zero
+        return [entry for each in conditions for entry in scope.evaluate(each.term, at, kinds[each.sense], each.name)]
+
+    @property
+    def lasting(self) -> tuple[Condition, ...]:
+        """Path conditions that no control enters: they hold at the end too."""
+        return tuple(each for each in self.constraints if not self.scope.uses(each.term) & set(self.inputs.names))
+
+
+def _constants(rows: Rows) -> Matrix:
+    """Zeros and ones as plain integers, so that they leave no trace."""
+    return [[int(value) if value in (0, 1, -1) else value for value in row] for row in rows]
+
+
+def total_square(residual: Vector) -> Any:
+    """|r|^2."""
+    return dot(residual, residual)

@@ -1,0 +1,42 @@
+"""What a derivative of a solution is taken from."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from lie_codegen.steering.ocp.problem_data import ProblemData
+
+Array = NDArray[Any]
+
+
+class Solution(Protocol):
+    """The plan's own data; see `OptimalPlan`."""
+
+    @property
+    def problem(self) -> ProblemData: ...
+
+    @property
+    def X(self) -> Array: ...
+
+    @property
+    def z(self) -> Array: ...
+
+    @property
+    def u(self) -> Array: ...
+
+    @property
+    def gain(self) -> Array: ...
+
+    @property
+    def multipliers(self) -> Array: ...
+
+    @property
+    def end_multipliers(self) -> Array: ...
+
+    @property
+    def penalty(self) -> float: ...
+
+    @property
+    def parameters(self) -> Array: ...

@@ -1,0 +1,40 @@
+"""Controls that are constant on each interval: an array, and a function of time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[Any]
+
+
+class StageControls(np.ndarray[Any, Any]):
+    """(N, m) controls, constant on each of N equally long intervals.
+
+    Attributes:
+        duration: of all intervals together [s].
+    """
+
+    duration: float
+
+    def __new__(cls, values: ArrayLike, duration: float) -> StageControls:
+        """A copy of the values."""
+        array = np.array(values, dtype=float).view(cls)
+        array.duration = duration
+        return array
+
+    def __array_finalize__(self, other: Any) -> None:
+        """A view or a result of arithmetic keeps the duration of what it came from."""
+        self.duration = getattr(other, "duration", 1.0)
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """u at t: (m,) for a number, (k, m) for (k,) times; the first and the last value before and after."""
+        times = np.asarray(t, dtype=float)
+        k = np.clip(np.floor(times / self.duration * len(self) + 1e-9), 0, len(self) - 1).astype(int)
+        return np.asarray(np.asarray(self)[k])
+
+    def __reduce__(self) -> Any:
+        """Values and duration."""
+        return StageControls, (np.asarray(self), self.duration)

@@ -1,0 +1,1064 @@
+/* SPDX-License-Identifier: MIT-0 */
+/*
+ * Bounded optimal control on a matrix group: an augmented Lagrangian around box-constrained differential dynamic programming.
+ *
+ *     minimise sum_k l(x_k, u_k) + phi(x_N)   subject to   x_{k+1} = F(x_k, u_k),  lower <= u_k <= upper,
+ *     g(x_k, u_k) <= 0,  g_N(x_N) <= 0,  e(x_N) = 0,        x = (X in G, z in R^q)
+ *
+ * One text for all groups and all problems. The file that includes it defines the sizes, as macros, and the functions of the
+ * model, as static functions; `OCP_(name)` puts the problem's name before a symbol. Derivatives are by d in
+ * x (+) d = (X exp(d_X^), z + d_z); the model gives them from 2-jets, so that no logarithm is differentiated.
+ *
+ * No allocation, no globals, bounded iterations. References: Tassa, Mansard, Todorov, ICRA 2014 (bounds by a quadratic
+ * program a stage); Nocedal and Wright, chapter 17 (augmented Lagrangian).
+ */
+
+typedef OCP_REAL real;
+typedef OCP_(workspace) workspace;
+
+enum {
+    NX = OCP_DIM + OCP_Q,       /* local coordinates of a state */
+    NV = NX + OCP_M,            /* and of a control */
+    NS = OCP_PACKED + OCP_Q,    /* numbers of a stored state */
+    NC = OCP_DIM + NX + OCP_M,  /* arguments of a Runge-Kutta stage: eta, theta, z, u */
+    NEND = OCP_NG_END + OCP_NE  /* conditions at the end */
+};
+
+#define OCP_LOOSE(round) ((real)(round == 0 ? 1e-3 : round == 1 ? 1e-4 : round == 2 ? 1e-5 : 1e-7))
+#define LARGEST_PENALTY ((real)1e7)
+#define CLEAN_PENALTY ((real)1e5)
+
+typedef struct {
+    workspace *w;
+    const real *p;      /* parameters, a row a stage */
+    ptrdiff_t stride;   /* from one row to the next; 0 where they are constant */
+    real t0;
+    int exact;          /* curvature of dynamics and constraints too, not Gauss-Newton alone */
+} task;
+
+/* What a linearised step keeps for its second order. */
+typedef struct {
+    real y[OCP_STAGES][NX];             /* argument of each Runge-Kutta stage, as (theta, change of z) */
+    real slope[OCP_STAGES][NX * NV];    /* its derivative by (d, u) */
+    real stage[OCP_STAGES][NX * NC];    /* derivative of the stage by its own arguments */
+    real total[NX];
+    real total_slope[NX * NV];
+    real right[OCP_DIM * OCP_DIM];      /* right Jacobian at the total */
+} chain;
+
+static const real *row(const task *s, int k) { return s->p + k * s->stride; }
+static real time_of(const task *s, int k) { return s->t0 + (real)k * OCP_H; }
+static real largest(real a, real b) { return a > b ? a : b; }
+static int is_finite(real a) { return a - a == 0; }
+
+static int all_finite(const real *a, int count)
+{
+    int i;
+    for (i = 0; i < count; ++i) {
+        if (!is_finite(a[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static void copy(real *to, const real *from, int count) { memcpy(to, from, (size_t)count * sizeof *to); }
+static void clear(real *to, int count) { memset(to, 0, (size_t)count * sizeof *to); }
+
+static real dot(const real *a, const real *b, int count)
+{
+    real total = 0;
+    int i;
+    for (i = 0; i < count; ++i) {
+        total += a[i] * b[i];
+    }
+    return total;
+}
+
+/* C (rows x columns) += factor A (rows x inner) B (inner x columns); the zeros of A, where derivatives vanish, cost nothing. */
+static void add_product(real *C, const real *A, const real *B, int rows, int inner, int columns, real factor)
+{
+    int i, k, j;
+    for (i = 0; i < rows; ++i) {
+        for (k = 0; k < inner; ++k) {
+            const real a = factor * A[i * inner + k];
+            if (a != 0) {
+                for (j = 0; j < columns; ++j) {
+                    C[i * columns + j] += a * B[k * columns + j];
+                }
+            }
+        }
+    }
+}
+
+/* C (rows x columns) += A' B, A (inner x rows), B (inner x columns). */
+static void add_transposed(real *C, const real *A, const real *B, int inner, int rows, int columns)
+{
+    int i, k, j;
+    for (k = 0; k < inner; ++k) {
+        for (i = 0; i < rows; ++i) {
+            const real a = A[k * rows + i];
+            if (a != 0) {
+                for (j = 0; j < columns; ++j) {
+                    C[i * columns + j] += a * B[k * columns + j];
+                }
+            }
+        }
+    }
+}
+
+/* Adds L' H L to Q (NV x NV), L (size x NV), H symmetric (size x size), size <= NC. */
+static void add_pulled_back(real *Q, const real *H, const real *L, int size)
+{
+    real T[(NC > NV ? NC : NV) * NV];
+    clear(T, size * NV);
+    add_product(T, H, L, size, size, NV, 1);
+    add_transposed(Q, L, T, size, NV, NV);
+}
+
+/* x_{k+1} = F(x, u): an explicit Runge-Kutta step in canonical coordinates around X, theta' = dexpinv_theta(xi). */
+static void step(const real *x, const real *u, const real *p, real t, real h, real *next)
+{
+    real y[NX], k[NX], total[NX];
+    int i, s;
+    clear(y, NX);
+    clear(total, NX);
+    for (s = 0; s < OCP_STAGES; ++s) {
+        for (i = 0; s > 0 && i < NX; ++i) {
+            y[i] = h * rk_a[s] * k[i];
+        }
+        model_stage(x, y, u, p, t + rk_c[s] * h, k);
+        for (i = 0; i < NX; ++i) {
+            total[i] += h * rk_b[s] * k[i];
+        }
+    }
+    model_move(x, total, next);
+}
+
+/*
+ * F and J = dF / d(d, u) (NX x NV). With F_X = X exp(Theta):  F_X^-1 F_X(moved) = Ad(exp(-Theta)) eta + J_r(Theta) dTheta
+ * to first order, and dTheta follows the stages by the chain rule.
+ */
+static void linear_step(const real *x, const real *u, const real *p, real t, real h, real *next, real *J, chain *c)
+{
+    real k[NX], slope[NX * NV], by_d[NX * NV], by_y[NX * NX], Ad[OCP_DIM * OCP_DIM];
+    int i, j, s;
+    clear(c->total, NX);
+    clear(c->total_slope, NX * NV);
+    for (s = 0; s < OCP_STAGES; ++s) {
+        real *y = c->y[s], *Y = c->slope[s], *S = c->stage[s];
+        clear(y, NX);
+        clear(Y, NX * NV);
+        for (i = 0; s > 0 && i < NX; ++i) {
+            y[i] = h * rk_a[s] * k[i];
+        }
+        for (i = 0; s > 0 && i < NX * NV; ++i) {
+            Y[i] = h * rk_a[s] * slope[i];
+        }
+        model_stage_jacobian(x, y, u, p, t + rk_c[s] * h, k, S);
+        /* arguments are (eta, theta, z, u): d and u enter directly, y through theta and, with d_z, through z */
+        for (i = 0; i < NX; ++i) {
+            const real *from = S + i * NC;
+            copy(by_d + i * NV, from, OCP_DIM);
+            copy(by_d + i * NV + OCP_DIM, from + 2 * OCP_DIM, OCP_Q + OCP_M);
+            copy(by_y + i * NX, from + OCP_DIM, NX);
+        }
+        copy(slope, by_d, NX * NV);
+        if (s > 0) {
+            add_product(slope, by_y, Y, NX, NX, NV, 1);
+        }
+        for (i = 0; i < NX; ++i) {
+            c->total[i] += h * rk_b[s] * k[i];
+        }
+        for (i = 0; i < NX * NV; ++i) {
+            c->total_slope[i] += h * rk_b[s] * slope[i];
+        }
+    }
+    model_move(x, c->total, next);
+    model_move_jacobian(c->total, Ad, c->right);
+    clear(J, NX * NV);
+    add_product(J, c->right, c->total_slope, OCP_DIM, OCP_DIM, NV, 1);
+    for (i = 0; i < OCP_DIM; ++i) {
+        for (j = 0; j < OCP_DIM; ++j) {
+            J[i * NV + j] += Ad[i * OCP_DIM + j];
+        }
+    }
+    for (i = OCP_DIM; i < NX; ++i) {
+        copy(J + i * NV, c->total_slope + i * NV, NV);
+        J[i * NV + i] += 1;
+    }
+}
+
+#if OCP_SECOND_ORDER
+/* Adds the Hessian of mu . F by (d, u) to H (NV x NV): from the end of the chain to its beginning. */
+static void add_step_curvature(const real *x, const real *u, const real *p, real t, real h, const chain *c,
+    const real *mu, real *H)
+{
+    real ends[4 * OCP_DIM * OCP_DIM], L[NC * NV], curve[NC * NC], nu[NX], m[NX], back[NX];
+    int i, j, s;
+    /* the end of the chain, X exp(eta) exp(Theta + dTheta): second order in (eta, dTheta) */
+    model_move_hessian(c->total, mu, ends);
+    clear(L, 2 * OCP_DIM * NV);
+    for (i = 0; i < OCP_DIM; ++i) {
+        L[i * NV + i] = 1;
+    }
+    copy(L + OCP_DIM * NV, c->total_slope, OCP_DIM * NV);
+    add_pulled_back(H, ends, L, 2 * OCP_DIM);
+    clear(nu, NX);
+    add_transposed(nu, c->right, mu, OCP_DIM, OCP_DIM, 1);
+    copy(nu + OCP_DIM, mu + OCP_DIM, OCP_Q);
+    clear(back, NX);
+    for (s = OCP_STAGES - 1; s >= 0; --s) {
+        for (i = 0; i < NX; ++i) {
+            m[i] = h * rk_b[s] * nu[i] + back[i];
+        }
+        model_stage_hessian(x, c->y[s], u, p, t + rk_c[s] * h, m, curve);
+        clear(L, NC * NV);
+        for (i = 0; i < OCP_DIM; ++i) {
+            L[i * NV + i] = 1;
+        }
+        copy(L + OCP_DIM * NV, c->slope[s], NX * NV);
+        for (i = 0; i < OCP_Q + OCP_M; ++i) {
+            L[(2 * OCP_DIM + i) * NV + OCP_DIM + i] += 1;
+        }
+        add_pulled_back(H, curve, L, NC);
+        clear(back, NX);
+        for (i = 0; s > 0 && i < NX; ++i) {
+            for (j = 0; j < NX; ++j) {
+                back[j] += h * rk_a[s] * c->stage[s][i * NC + OCP_DIM + j] * m[i];
+            }
+        }
+    }
+}
+#endif
+
+/* What bounds a multiplier: lambda + rho g where that is positive. */
+static real pressed(real lambda, real rho, real g) { return largest(0, lambda + rho * g); }
+
+/* A path condition on the state alone cannot be changed at the start, where the state is given. */
+static int is_given(int k, int i) { return k == 0 && !needs_control[i]; }
+
+/* Cost of the interval k at the nodes of the quadrature; the node in the middle is reached by half a step. */
+static real cost_at(const real *x, const real *u, const real *p, real t)
+{
+    real value;
+    model_cost(x, u, p, t, &value);
+    return value;
+}
+
+static real interval_cost(const task *s, int k, const real *x, const real *u, const real *next)
+{
+    real total = 0, middle[NS];
+    int j;
+    for (j = 0; j < OCP_NODES; ++j) {
+        if (node_c[j] == 0) {
+            total += node_w[j] * cost_at(x, u, row(s, k), time_of(s, k));
+        } else if (node_c[j] == 1) {
+            total += node_w[j] * cost_at(next, u, row(s, k + 1), time_of(s, k + 1));
+        } else {
+            step(x, u, row(s, k), time_of(s, k), node_c[j] * OCP_H, middle);
+            total += node_w[j] * cost_at(middle, u, row(s, k), time_of(s, k) + node_c[j] * OCP_H);
+        }
+    }
+    return total;
+}
+
+/* What the augmented Lagrangian adds to the cost at the stage k. */
+static real path_terms(const task *s, int k, const real *x, const real *u)
+{
+    real total = 0;
+#if OCP_NG > 0
+    real g[OCP_NG];
+    int i;
+    model_path(x, u, row(s, k), time_of(s, k), g);
+    for (i = 0; i < OCP_NG; ++i) {
+        const real lambda = s->w->lambda[k][i], a = pressed(lambda, s->w->rho, g[i]);
+        if (!is_given(k, i)) {
+            total += (a * a - lambda * lambda) / (2 * s->w->rho);
+        }
+    }
+#else
+    (void)s, (void)k, (void)x, (void)u;
+#endif
+    return total;
+}
+
+static real end_terms(const task *s, const real *x)
+{
+    real total;
+    model_end_cost(x, row(s, OCP_N), time_of(s, OCP_N), &total);
+#if OCP_NG_END + OCP_NE > 0
+    real c[NEND];
+    int i;
+    model_end(x, row(s, OCP_N), time_of(s, OCP_N), c);
+    for (i = 0; i < NEND; ++i) {
+        const real lambda = s->w->lambda_end[i], rho = s->w->rho;
+        const real a = pressed(lambda, rho, c[i]);
+        total += i < OCP_NG_END ? (a * a - lambda * lambda) / (2 * rho) : lambda * c[i] + rho * c[i] * c[i] / 2;
+    }
+#endif
+    return total;
+}
+
+#if OCP_PLANS
+static real merit(const task *s, real (*x)[NS], real (*u)[OCP_M])
+{
+    real total = end_terms(s, x[OCP_N]);
+    int k;
+    for (k = 0; k < OCP_N; ++k) {
+        total += interval_cost(s, k, x[k], u[k], x[k + 1]) + path_terms(s, k, x[k], u[k]);
+    }
+    return total;
+}
+static real plain_cost(const task *s)
+{
+    const workspace *w = s->w;
+    real total;
+    int k;
+    model_end_cost(w->x[OCP_N], row(s, OCP_N), time_of(s, OCP_N), &total);
+    for (k = 0; k < OCP_N; ++k) {
+        total += interval_cost(s, k, w->x[k], w->u[k], w->x[k + 1]);
+    }
+    return total;
+}
+#endif
+
+/* Notes the worst condition: by how much, which, at which stage. Rows of g come first, then those of the end. */
+static void find_violation(const task *s)
+{
+    workspace *w = s->w;
+    w->violation = 0;
+    w->worst = -1;
+    w->worst_stage = -1;
+#if OCP_NG > 0
+    {
+        real g[OCP_NG];
+        int k, i;
+        for (k = 0; k < OCP_N; ++k) {
+            model_path(w->x[k], w->u[k], row(s, k), time_of(s, k), g);
+            for (i = 0; i < OCP_NG; ++i) {
+                if (!is_given(k, i) && !(g[i] <= w->violation)) {
+                    w->violation = g[i];
+                    w->worst = i;
+                    w->worst_stage = k;
+                }
+            }
+        }
+    }
+#endif
+#if OCP_NG_END + OCP_NE > 0
+    {
+        real c[NEND];
+        int i;
+        model_end(w->x[OCP_N], row(s, OCP_N), time_of(s, OCP_N), c);
+        for (i = 0; i < NEND; ++i) {
+            const real off = i < OCP_NG_END || c[i] > 0 ? c[i] : -c[i];
+            if (!(off <= w->violation)) {
+                w->violation = off;
+                w->worst = OCP_NG + i;
+                w->worst_stage = OCP_N;
+            }
+        }
+    }
+#endif
+}
+
+static void update_multipliers(const task *s)
+{
+    workspace *w = s->w;
+#if OCP_NG > 0
+    {
+        real g[OCP_NG];
+        int k, i;
+        for (k = 0; k < OCP_N; ++k) {
+            model_path(w->x[k], w->u[k], row(s, k), time_of(s, k), g);
+            for (i = 0; i < OCP_NG; ++i) {
+                w->lambda[k][i] = is_given(k, i) ? 0 : pressed(w->lambda[k][i], w->rho, g[i]);
+            }
+        }
+    }
+#endif
+#if OCP_NG_END + OCP_NE > 0
+    {
+        real c[NEND];
+        int i;
+        model_end(w->x[OCP_N], row(s, OCP_N), time_of(s, OCP_N), c);
+        for (i = 0; i < NEND; ++i) {
+            const real moved = w->lambda_end[i] + w->rho * c[i];
+            w->lambda_end[i] = i < OCP_NG_END ? largest(0, moved) : moved;
+        }
+    }
+#endif
+    (void)w;
+}
+
+/* Lower Cholesky factor of the rows and columns `index` of Q (M x M); 0 where it is not positive definite. */
+static int cholesky(const real *Q, const int *index, int count, real *L)
+{
+    int i, j, k;
+    for (i = 0; i < count; ++i) {
+        for (j = 0; j <= i; ++j) {
+            real value = Q[index[i] * OCP_M + index[j]];
+            for (k = 0; k < j; ++k) {
+                value -= L[i * OCP_M + k] * L[j * OCP_M + k];
+            }
+            if (i == j) {
+                const real scale = Q[index[i] * OCP_M + index[i]];
+                if (!(value > OCP_EPSILON * 64 * (scale > 0 ? scale : -scale)) || !is_finite(value)) {
+                    return 0;
+                }
+                L[i * OCP_M + i] = OCP_SQRT(value);
+            } else {
+                L[i * OCP_M + j] = value / L[j * OCP_M + j];
+            }
+        }
+    }
+    return 1;
+}
+
+static void cholesky_solve(const real *L, int count, real *b)
+{
+    int i, k;
+    for (i = 0; i < count; ++i) {
+        for (k = 0; k < i; ++k) {
+            b[i] -= L[i * OCP_M + k] * b[k];
+        }
+        b[i] /= L[i * OCP_M + i];
+    }
+    for (i = count - 1; i >= 0; --i) {
+        for (k = i + 1; k < count; ++k) {
+            b[i] -= L[k * OCP_M + i] * b[k];
+        }
+        b[i] /= L[i * OCP_M + i];
+    }
+}
+
+/*
+ * argmin s'Qs/2 + q's over low <= s <= high, by projected Newton steps from s = 0. Leaves the free rows in `index` and the
+ * factor of their block in L; -1 where that block is not positive definite, else the number of free rows.
+ */
+static int box_program(const real *Q, const real *q, const real *low, const real *high, real *s, int *index, real *L)
+{
+    real gradient[OCP_M], move[OCP_M], trial[OCP_M], before = 0, scale = 0;
+    int iteration, i, count = 0;
+    for (i = 0; i < OCP_M; ++i) {
+        s[i] = 0;
+        scale = largest(scale, q[i] > 0 ? q[i] : -q[i]);
+    }
+    for (iteration = 0; iteration < 25; ++iteration) {
+        real size = 0, alpha = 1, decrease = 0;
+        int same = iteration > 0, old = count;
+        count = 0;
+        for (i = 0; i < OCP_M; ++i) {
+            gradient[i] = q[i] + dot(Q + i * OCP_M, s, OCP_M);
+            if (!((s[i] <= low[i] && gradient[i] > 0) || (s[i] >= high[i] && gradient[i] < 0))) {
+                same = same && count < old && index[count] == i;
+                index[count++] = i;
+                size = largest(size, gradient[i] > 0 ? gradient[i] : -gradient[i]);
+            }
+        }
+        same = same && count == old;
+        if (!same && count > 0 && !cholesky(Q, index, count, L)) {
+            return -1;
+        }
+        if (count == 0 || size <= OCP_EPSILON * 16 * scale) {
+            return count;
+        }
+        for (i = 0; i < count; ++i) {
+            move[i] = -gradient[index[i]];
+        }
+        cholesky_solve(L, count, move);
+        for (;;) {
+            real value = 0;
+            copy(trial, s, OCP_M);
+            for (i = 0; i < count; ++i) {
+                const real to = s[index[i]] + alpha * move[i];
+                trial[index[i]] = to < low[index[i]] ? low[index[i]] : to > high[index[i]] ? high[index[i]] : to;
+            }
+            decrease = 0;
+            for (i = 0; i < OCP_M; ++i) {
+                value += trial[i] * (q[i] + dot(Q + i * OCP_M, trial, OCP_M) / 2);
+                decrease -= gradient[i] * (trial[i] - s[i]);
+            }
+            if (before - value >= (real)0.1 * decrease || alpha < (real)1e-3) {
+                before = value;
+                break;
+            }
+            alpha /= 2;
+        }
+        if (decrease <= OCP_EPSILON * (1 + (before > 0 ? before : -before))) {
+            copy(s, trial, OCP_M);
+            return count;
+        }
+        copy(s, trial, OCP_M);
+    }
+    return count;
+}
+
+/* Adds what a node of the quadrature with its own derivative J of x (NX x NV) adds to the Hessian and the gradient. */
+static void add_node(const real *W, const real *w, const real *J, real *Q, real *q)
+{
+    real L[NV * NV];
+    int i;
+    clear(L, NV * NV);
+    copy(L, J, NX * NV);
+    for (i = 0; i < OCP_M; ++i) {
+        L[(NX + i) * NV + NX + i] = 1;
+    }
+    add_pulled_back(Q, W, L, NV);
+    add_transposed(q, L, w, NV, NV, 1);
+}
+
+static real cost_terms(const task *s, const real *x, const real *u, const real *p, real t, real *gradient, real *H)
+{
+    real value;
+#if OCP_SECOND_ORDER
+    if (s->exact) {
+        model_cost_exact(x, u, p, t, &value, gradient, H);
+        return value;
+    }
+#endif
+    (void)s;
+    model_cost_square(x, u, p, t, &value, gradient, H);
+    return value;
+}
+
+/* Hessian P and gradient v of what the last state costs; the value of it is returned. */
+static real end_model(const task *s, real *P, real *v)
+{
+    const real *x = s->w->x[OCP_N], *p = row(s, OCP_N);
+    const real t = time_of(s, OCP_N);
+    real value;
+#if OCP_SECOND_ORDER
+    if (s->exact) {
+        model_end_cost_exact(x, p, t, &value, v, P);
+    } else
+#endif
+    {
+        model_end_cost_square(x, p, t, &value, v, P);
+    }
+#if OCP_NG_END + OCP_NE > 0
+    {
+        real c[NEND], C[NEND * NX], a[NEND];
+        const real rho = s->w->rho;
+        int i, j, m;
+        model_end_jacobian(x, p, t, c, C);
+        for (i = 0; i < NEND; ++i) {
+            const real lambda = s->w->lambda_end[i];
+            a[i] = lambda + rho * c[i];
+            if (i < OCP_NG_END) {
+                a[i] = largest(0, a[i]);
+                value += (a[i] * a[i] - lambda * lambda) / (2 * rho);
+            } else {
+                value += lambda * c[i] + rho * c[i] * c[i] / 2;
+            }
+            if (i >= OCP_NG_END || a[i] > 0) {
+                for (j = 0; j < NX; ++j) {
+                    v[j] += a[i] * C[i * NX + j];
+                    for (m = 0; m < NX; ++m) {
+                        P[j * NX + m] += rho * C[i * NX + j] * C[i * NX + m];
+                    }
+                }
+            }
+        }
+#if OCP_SECOND_ORDER
+        if (s->exact) {
+            real H[NX * NX];
+            model_end_hessian(x, p, t, a, H);
+            for (i = 0; i < NX * NX; ++i) {
+                P[i] += H[i];
+            }
+        }
+#endif
+    }
+#endif
+    return value;
+}
+
+/*
+ * Hessian Q (NV x NV) and gradient q of stage k's cost-to-go in (d, u), from that of the next one (P, v); returns the
+ * stage's own cost. Everything is linearised here and forgotten again: nothing of it is stored.
+ */
+static real stage_model(const task *s, int k, const real *P, const real *v, real *Q, real *q)
+{
+    workspace *w = s->w;
+    const real *x = w->x[k], *u = w->u[k], *p = row(s, k);
+    const real t = time_of(s, k);
+    real W[NV * NV], weighted[NV], H[NV * NV], gradient[NV], J[NX * NV], next[NS], value = 0;
+    chain c;
+    int i, j, n;
+    clear(Q, NV * NV);
+    clear(q, NV);
+    clear(W, NV * NV);
+    clear(weighted, NV);
+    for (i = 0; i < NX; ++i) {
+        copy(W + i * NV, P + i * NX, NX);
+    }
+    copy(weighted, v, NX);
+    for (n = 0; n < OCP_NODES; ++n) {
+        if (node_c[n] == 1) {
+            value += node_w[n] * cost_terms(s, w->x[k + 1], u, row(s, k + 1), time_of(s, k + 1), gradient, H);
+            for (i = 0; i < NV * NV; ++i) {
+                W[i] += node_w[n] * H[i];
+            }
+            for (i = 0; i < NV; ++i) {
+                weighted[i] += node_w[n] * gradient[i];
+            }
+        }
+    }
+    linear_step(x, u, p, t, OCP_H, next, J, &c);
+    add_node(W, weighted, J, Q, q);
+#if OCP_SECOND_ORDER
+    if (s->exact) {
+        add_step_curvature(x, u, p, t, OCP_H, &c, weighted, Q);
+    }
+#endif
+    for (n = 0; n < OCP_NODES; ++n) {
+        if (node_c[n] == 0) {
+            value += node_w[n] * cost_terms(s, x, u, p, t, gradient, H);
+            for (i = 0; i < NV * NV; ++i) {
+                Q[i] += node_w[n] * H[i];
+            }
+            for (i = 0; i < NV; ++i) {
+                q[i] += node_w[n] * gradient[i];
+            }
+        } else if (node_c[n] < 1) {
+            linear_step(x, u, p, t, node_c[n] * OCP_H, next, J, &c);
+            value += node_w[n] * cost_terms(s, next, u, p, t + node_c[n] * OCP_H, gradient, H);
+            for (i = 0; i < NV * NV; ++i) {
+                H[i] *= node_w[n];
+            }
+            for (i = 0; i < NV; ++i) {
+                gradient[i] *= node_w[n];
+            }
+            add_node(H, gradient, J, Q, q);
+#if OCP_SECOND_ORDER
+            if (s->exact) {
+                add_step_curvature(x, u, p, t, node_c[n] * OCP_H, &c, gradient, Q);
+            }
+#endif
+        }
+    }
+#if OCP_NG > 0
+    {
+        real g[OCP_NG], G[OCP_NG * NV], a[OCP_NG];
+        model_path_jacobian(x, u, p, t, g, G);
+        for (n = 0; n < OCP_NG; ++n) {
+            const real lambda = w->lambda[k][n];
+            a[n] = is_given(k, n) ? 0 : pressed(lambda, w->rho, g[n]);
+            value += is_given(k, n) ? 0 : (a[n] * a[n] - lambda * lambda) / (2 * w->rho);
+            for (i = 0; a[n] > 0 && i < NV; ++i) {
+                const real by = G[n * NV + i];
+                q[i] += a[n] * by;
+                for (j = 0; by != 0 && j < NV; ++j) {
+                    Q[i * NV + j] += w->rho * by * G[n * NV + j];
+                }
+            }
+        }
+#if OCP_SECOND_ORDER
+        if (s->exact) {
+            model_path_hessian(x, u, p, t, a, H);
+            for (i = 0; i < NV * NV; ++i) {
+                Q[i] += H[i];
+            }
+        }
+#endif
+    }
+#endif
+    (void)j;
+    return value;
+}
+
+/*
+ * One sweep backwards: gains and feed-forward of every stage. Returns 0 where a block is not positive definite.
+ * `gain`: what the model promises; `value`: the merit of the trajectory; P, v: Hessian and gradient of the cost-to-go of x_0.
+ */
+static int backward(const task *s, real shift, real *gain, real *value, real *P, real *v)
+{
+    workspace *w = s->w;
+    real Q[NV * NV], q[NV];
+    int i, j, k;
+    *gain = 0;
+    *value = end_model(s, P, v);
+    for (k = OCP_N - 1; k >= 0; --k) {
+        real shifted[OCP_M * OCP_M], low[OCP_M], high[OCP_M], L[OCP_M * OCP_M], column[OCP_M], Qk[OCP_M], QK[OCP_M * NX];
+        real *K = w->K[k], *kappa = w->kappa[k];
+        int index[OCP_M], count;
+        *value += stage_model(s, k, P, v, Q, q);
+        for (i = 0; i < OCP_M; ++i) {
+            for (j = 0; j < OCP_M; ++j) {
+                shifted[i * OCP_M + j] = Q[(NX + i) * NV + NX + j] + (i == j ? shift : 0);
+            }
+            low[i] = lower_bound[i] - w->u[k][i];
+            high[i] = upper_bound[i] - w->u[k][i];
+        }
+        count = box_program(shifted, q + NX, low, high, kappa, index, L);
+        if (count < 0) {
+            return 0;
+        }
+        clear(K, OCP_M * NX);
+        for (j = 0; j < NX; ++j) {
+            for (i = 0; i < count; ++i) {
+                column[i] = -Q[(NX + index[i]) * NV + j];
+            }
+            cholesky_solve(L, count, column);
+            for (i = 0; i < count; ++i) {
+                K[index[i] * NX + j] = column[i];
+            }
+        }
+        /* the cost-to-go under u + kappa + K d, with the true Q_uu: the shift only shortens the step */
+        clear(QK, OCP_M * NX);
+        for (i = 0; i < OCP_M; ++i) {
+            Qk[i] = 0;
+            for (j = 0; j < OCP_M; ++j) {
+                const real quu = Q[(NX + i) * NV + NX + j];
+                int m;
+                Qk[i] += quu * kappa[j];
+                for (m = 0; m < NX; ++m) {
+                    QK[i * NX + m] += quu * K[j * NX + m];
+                }
+            }
+            *gain -= kappa[i] * (q[NX + i] + Qk[i] / 2);
+        }
+        for (i = 0; i < NX; ++i) {
+            real total = q[i];
+            for (j = 0; j < OCP_M; ++j) {
+                total += K[j * NX + i] * (q[NX + j] + Qk[j]) + Q[(NX + j) * NV + i] * kappa[j];
+            }
+            v[i] = total;
+            for (j = 0; j <= i; ++j) {
+                real entry = (Q[i * NV + j] + Q[j * NV + i]) / 2;
+                int m;
+                for (m = 0; m < OCP_M; ++m) {
+                    const real *qux = Q + (NX + m) * NV;
+                    entry += qux[i] * K[m * NX + j] + K[m * NX + i] * qux[j]
+                        + (K[m * NX + i] * QK[m * NX + j] + QK[m * NX + i] * K[m * NX + j]) / 2;
+                }
+                P[i * NX + j] = entry;
+                P[j * NX + i] = entry;
+            }
+        }
+        if (!is_finite(v[0]) || !is_finite(P[0])) {
+            return 0;
+        }
+    }
+    return is_finite(*value) && is_finite(*gain);
+}
+
+/* Rolls out u + alpha kappa + K d from w->x_new[0] into x_new, u_new; returns the merit. */
+static real forward(const task *s, real alpha)
+{
+    workspace *w = s->w;
+    real total = 0, d[NX];
+    int k, i;
+    for (k = 0; k < OCP_N; ++k) {
+        model_difference(w->x[k], w->x_new[k], d);
+        for (i = 0; i < OCP_M; ++i) {
+            const real u = w->u[k][i] + alpha * w->kappa[k][i] + dot(w->K[k] + i * NX, d, NX);
+            w->u_new[k][i] = u > lower_bound[i] ? (u < upper_bound[i] ? u : upper_bound[i]) : lower_bound[i];
+        }
+        step(w->x_new[k], w->u_new[k], row(s, k), time_of(s, k), OCP_H, w->x_new[k + 1]);
+        total += interval_cost(s, k, w->x_new[k], w->u_new[k], w->x_new[k + 1]);
+        total += path_terms(s, k, w->x_new[k], w->u_new[k]);
+        if (!is_finite(total)) {
+            return total;
+        }
+    }
+    return total + end_terms(s, w->x_new[OCP_N]);
+}
+
+static void take_new(workspace *w)
+{
+    memcpy(w->x, w->x_new, sizeof w->x);
+    memcpy(w->u, w->u_new, sizeof w->u);
+}
+
+#if OCP_PLANS
+static int roll_out(const task *s)
+{
+    workspace *w = s->w;
+    int k, i;
+    for (k = 0; k < OCP_N; ++k) {
+        for (i = 0; i < OCP_M; ++i) {
+            const real u = w->u[k][i];
+            w->u[k][i] = u > lower_bound[i] ? (u < upper_bound[i] ? u : upper_bound[i]) : lower_bound[i];
+        }
+        step(w->x[k], w->u[k], row(s, k), time_of(s, k), OCP_H, w->x[k + 1]);
+    }
+    return all_finite(w->x[0], (OCP_N + 1) * NS);
+}
+
+/* One iteration; returns 1 where M fell, 0 where it did not, 2 where there is nothing left to gain. */
+static int iterate(task *s, real *M, real *shift, real least)
+{
+    workspace *w = s->w;
+    real gain = 0, value, alpha, P[NX * NX], v[NX];
+    int tries;
+    for (tries = 0; !backward(s, *shift, &gain, &value, P, v); ++tries) {
+        if (tries == 20) {
+            return 0;
+        }
+        ++w->sweeps;
+        if (s->exact) {
+            s->exact = 0; /* far from a minimum: a Gauss-Newton step leads on, a shifted one hardly moves */
+            continue;
+        }
+        *shift = largest(10 * *shift, (real)1e-6);
+    }
+    ++w->sweeps;
+    if (gain <= least) {
+        return 2;
+    }
+    copy(w->x_new[0], w->x[0], NS);
+    for (alpha = 1; alpha > (real)4e-4; alpha /= 2) {
+        const real trial = forward(s, alpha);
+        if (*M - trial >= (real)1e-4 * alpha * gain) {
+            take_new(w);
+            *M = trial;
+            *shift = *shift * (real)0.3 < (real)1e-5 ? 0 : *shift * (real)0.3;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Minimises the augmented Lagrangian for the multipliers and the penalty at hand. */
+static void inner(task *s, real tolerance, int most)
+{
+    workspace *w = s->w;
+    real M = merit(s, w->x, w->u), shift = 0;
+    int failures = 0;
+    while (w->iterations < most) {
+        const real before = M, size = 1 + (M > 0 ? M : -M);
+        const int was_exact = s->exact;
+        const int done = iterate(s, &M, &shift, OCP_EPSILON * size);
+        ++w->iterations;
+        if (done == 2) {
+            return;
+        }
+        if (done == 0) {
+            if (++failures > 8) {
+                return;
+            }
+            shift = largest(10 * shift, s->exact ? (real)1e-3 : (real)1e-6);
+            continue;
+        }
+        failures = 0;
+        /* the last step is an exact one, or one that had to do without */
+        if (before - M < tolerance * size && (was_exact || !OCP_SECOND_ORDER || !w->curvature)) {
+            return;
+        }
+        if (before - M < (real)1e-2 * size && OCP_SECOND_ORDER && w->curvature) {
+            s->exact = 1;
+        }
+    }
+}
+
+int OCP_(solve)(workspace *w, const real *p, ptrdiff_t stride, real t0, real tolerance, real allowed, int outer, int most)
+{
+    task s;
+    real last = (real)HUGE_VAL;
+    int round, stuck = 0, conditions = OCP_NG + NEND > 0;
+    s.w = w;
+    s.p = p;
+    s.stride = stride;
+    s.t0 = t0;
+    s.exact = OCP_SECOND_ORDER && w->curvature == 2;
+    w->iterations = w->sweeps = 0;
+    w->status = OCP_DIVERGED;
+    if (!roll_out(&s)) {
+        w->cost = w->violation = (real)HUGE_VAL;
+        return w->status;
+    }
+    for (round = 0; round < outer; ++round) {
+        const real loose = conditions && round < 4 ? largest(tolerance, OCP_LOOSE(round)) : tolerance;
+        inner(&s, loose, most);
+        find_violation(&s);
+        if (conditions) {
+            update_multipliers(&s);
+        }
+        if (w->violation <= allowed && loose <= tolerance) {
+            break;
+        }
+        if (w->iterations >= most) {
+            break;
+        }
+        if (!(w->violation <= allowed)) {
+            w->rho = w->rho * 10 < LARGEST_PENALTY ? w->rho * 10 : LARGEST_PENALTY;
+        }
+        /* at the largest penalty and still no better: a corner between conditions that no small step leaves */
+        stuck = w->violation > last / 2 && w->rho >= LARGEST_PENALTY ? stuck + 1 : 0;
+        if (stuck == 3) {
+            break;
+        }
+        last = w->violation;
+    }
+    w->cost = plain_cost(&s);
+    if (!is_finite(w->cost)) {
+        w->status = OCP_DIVERGED;
+    } else if (!(w->violation <= allowed)) {
+        w->status = OCP_NOT_ADMISSIBLE;
+    } else {
+        w->status = round < outer && w->iterations < most && stuck < 3 ? OCP_SOLVED : OCP_ADMISSIBLE;
+    }
+    return w->status;
+}
+
+/* One clean sweep at the solution: K and P_0 are then derivatives of the optimum. Returns the shift that Q_uu needed. */
+real OCP_(gains)(workspace *w, const real *p, ptrdiff_t stride, real t0)
+{
+    task s;
+    real gain, value, shift = 0;
+    int tries;
+    s.w = w;
+    s.p = p;
+    s.stride = stride;
+    s.t0 = t0;
+    s.exact = OCP_SECOND_ORDER && w->curvature;
+    w->rho = largest(w->rho, CLEAN_PENALTY);
+    for (tries = 0; !backward(&s, shift, &gain, &value, w->P, w->v) && tries < 20; ++tries) {
+        shift = largest(10 * shift, (real)1e-6);
+    }
+    return shift;
+}
+
+/* Controls that cost least at the first state, held: a first guess that hovers where hovering is cheap. */
+void OCP_(first_guess)(workspace *w, const real *p, real t0)
+{
+    real gradient[NV], H[NV * NV], Q[OCP_M * OCP_M], low[OCP_M], high[OCP_M], move[OCP_M], L[OCP_M * OCP_M];
+    real value;
+    int k, i, j, round, index[OCP_M];
+    for (i = 0; i < OCP_M; ++i) {
+        w->u[0][i] = 0 > lower_bound[i] ? (0 < upper_bound[i] ? 0 : upper_bound[i]) : lower_bound[i];
+    }
+    for (round = 0; round < 10; ++round) {
+        model_cost_square(w->x[0], w->u[0], p, t0, &value, gradient, H);
+        for (i = 0; i < OCP_M; ++i) {
+            for (j = 0; j < OCP_M; ++j) {
+                Q[i * OCP_M + j] = H[(NX + i) * NV + NX + j];
+            }
+            low[i] = lower_bound[i] - w->u[0][i];
+            high[i] = upper_bound[i] - w->u[0][i];
+            gradient[i] = gradient[NX + i];
+        }
+        if (!all_finite(Q, OCP_M * OCP_M) || box_program(Q, gradient, low, high, move, index, L) < 0) {
+            break;
+        }
+        for (i = 0; i < OCP_M; ++i) {
+            w->u[0][i] += move[i];
+        }
+    }
+    for (k = 1; k < OCP_N; ++k) {
+        copy(w->u[k], w->u[0], OCP_M);
+    }
+}
+#endif
+
+/* Moves plan and multipliers one interval on; the last control is repeated and the last state rolled out. */
+static void shift_plan(const task *s)
+{
+    workspace *w = s->w;
+    memmove(w->x[0], w->x[1], OCP_N * sizeof w->x[0]);
+    memmove(w->u[0], w->u[1], (OCP_N - 1) * sizeof w->u[0]);
+#if OCP_NG > 0
+    memmove(w->lambda[0], w->lambda[1], (OCP_N - 1) * sizeof w->lambda[0]);
+#endif
+    step(w->x[OCP_N - 1], w->u[OCP_N - 1], row(s, OCP_N - 1), time_of(s, OCP_N - 1), OCP_H, w->x[OCP_N]);
+}
+
+/* The sample's own step: see the header. */
+int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdiff_t stride, real t0, int iterations, real *u)
+{
+    task s;
+    real measured[NS], gain, value, P[NX * NX], v[NX], d[NX], shift = 0;
+    int i, round, tries, numbers = stride == 0 ? OCP_NP : (OCP_N + 1) * OCP_NP;
+    s.w = w;
+    s.p = p;
+    s.stride = stride;
+    s.t0 = t0;
+    s.exact = 0;
+    w->status = OCP_OK;
+    for (i = 0; i < OCP_PACKED; ++i) {
+        measured[i] = X[packed_from[i]];
+    }
+    for (i = 0; i < OCP_Q; ++i) {
+        measured[OCP_PACKED + i] = z[i];
+    }
+    if (!all_finite(measured, NS) || !all_finite(p, numbers) || !is_finite(t0)) {
+        /* the plan moves on without its model, whose parameters may be what is not a number */
+        if (!w->fresh) {
+            memmove(w->x[0], w->x[1], OCP_N * sizeof w->x[0]);
+            memmove(w->u[0], w->u[1], (OCP_N - 1) * sizeof w->u[0]);
+        }
+        w->fresh = 0;
+        copy(u, w->u[0], OCP_M);
+        w->status = OCP_INPUT;
+        return w->status;
+    }
+    if (!w->fresh) {
+        shift_plan(&s);
+    }
+    w->fresh = 0;
+    for (round = 0; round < iterations; ++round) {
+        real reference, trial = 0, alpha, first[OCP_M];
+        int swept = 0, tried, accepted = 0;
+        for (tries = 0; tries <= 3 && !swept; ++tries) {
+            swept = backward(&s, shift, &gain, &value, P, v);
+            shift = swept ? shift : largest(10 * shift, (real)1e-6);
+        }
+        copy(w->x_new[0], measured, NS);
+        if (!swept) {
+            if (round == 0) {
+                memset(w->K, 0, sizeof w->K);
+                w->status = OCP_HELD;
+            }
+            break;
+        }
+        /* the quadratic model's merit from the measured state; a roll-out that does about as well needs no comparison */
+        model_difference(w->x[0], measured, d);
+        reference = value;
+        for (i = 0; i < NX; ++i) {
+            reference += d[i] * (v[i] + dot(P + i * NX, d, NX) / 2);
+        }
+        for (i = 0; i < OCP_M; ++i) {
+            const real held = w->u[0][i] + dot(w->K[0] + i * NX, d, NX);
+            first[i] = held > lower_bound[i] ? (held < upper_bound[i] ? held : upper_bound[i]) : lower_bound[i];
+        }
+        trial = forward(&s, 1);
+        accepted = trial <= reference;
+        if (!accepted) {
+            const real full = trial;
+            reference = forward(&s, 0);
+            if (is_finite(reference) && !(full <= reference)) {
+                for (alpha = (real)0.5, tried = 1; tried < 4 && !accepted; ++tried, alpha /= 2) {
+                    trial = forward(&s, alpha);
+                    accepted = trial <= reference;
+                }
+            } else if (is_finite(full)) {
+                trial = forward(&s, 1);
+                accepted = 1;
+            }
+            if (!accepted) {
+                const real held = forward(&s, 0);
+                if (is_finite(held)) {
+                    take_new(w);
+                } else {
+                    copy(w->x[0], measured, NS);
+                    copy(w->u[0], first, OCP_M);
+                }
+                w->status = round == 0 ? OCP_HELD : w->status;
+                break;
+            }
+        }
+        take_new(w);
+    }
+    if (w->status == OCP_OK) {
+        update_multipliers(&s);
+        find_violation(&s);
+    }
+    for (i = 0; i < OCP_M; ++i) {
+        const real value_of = w->u[0][i];
+        u[i] = value_of > lower_bound[i] ? (value_of < upper_bound[i] ? value_of : upper_bound[i]) : lower_bound[i];
+    }
+    return w->status;
+}

@@ -1,0 +1,91 @@
+"""The generated solver as C: strict compilation, sanitizers, one core for all, no allocation."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ocp_systems import car, quadrotor, satellite
+
+from lie_codegen.steering.ocp.source import CORE, render_solver, solver_view
+
+STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
+COMPILER = shutil.which("gcc") or shutil.which("cc")
+
+DRIVER = """
+#include "{name}.h"
+#include <stdio.h>
+static {name}_workspace w;
+int main(void)
+{{
+    static const {real} p[] = {{ {parameters} }};
+    {real} X[16] = {{0}}, z[16] = {{0}}, u[8];
+    int i, status;
+    for (i = 0; i < {degree}; ++i) X[i * {degree} + i] = 1;
+    for (i = 0; i < {stored}; ++i) w.x[0][i] = ({real})((int[]){{ {first} }})[i];
+    w.rho = 10;
+    w.curvature = 1;
+    {name}_first_guess(&w, p, 0);
+    status = {name}_solve(&w, p, 0, 0, ({real}){tolerance}, ({real}){allowed}, 25, 300);
+    printf("%d %.12f %.3e %d\\n", status, (double)w.cost, (double)w.violation, (int)sizeof w);
+    {name}_gains(&w, p, 0, 0);
+    w.rho = 300;
+    w.fresh = 1;
+    for (i = 0; i < 5; ++i) status = {name}_step(&w, X, z, p, 0, 0, 1, u);
+    z[0] /= 0 * z[0];
+    status += {name}_step(&w, X, z, p, 0, 0, 1, u);
+    return status;
+}}
+"""
+
+
+def run(problem: Any, folder: Path, real: str, parameters: str, *flags: str) -> list[str]:
+    """What the driver prints: status, cost, violation, bytes."""
+    view, _ = solver_view(problem.data, second_order=True, real=real)
+    for path, text in render_solver(view).items():
+        (folder / path).write_text(text)
+    first = ", ".join(str(int(i % (view.degree + 1) == 0)) for i in view.packed_from) + ", 0" * view.q
+    tolerance, allowed = ("1e-10", "1e-8") if real == "double" else ("1e-5", "1e-3")
+    values = {"name": view.prefix, "degree": view.degree, "stored": view.stored, "first": first, "real": real}
+    driver = DRIVER.format(parameters=parameters, tolerance=tolerance, allowed=allowed, **values)
+    (folder / "driver.c").write_text(driver)
+    command = [str(COMPILER), "-O1", *flags, "driver.c", f"{view.prefix}.c", "-lm", "-o", "driver"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    done = subprocess.run([folder / "driver"], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.returncode in (4 + 6, 5 + 6)
+    assert view.bytes == int(done.stdout.split()[3])
+    return done.stdout.split()
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_the_solver_is_strict_c99_and_clean_under_the_sanitizers(tmp_path: Path) -> None:
+    sanitizers = (
+        "-fsanitize=address,undefined",
+        "-fno-sanitize-recover=undefined",
+        "-fno-sanitize=float-divide-by-zero",
+    )
+    status, cost, _, _ = run(quadrotor(), tmp_path, "double", "2, 0, 1, 1, 0.05, 0.4", *STRICT, *sanitizers)
+    assert status == "0"
+    assert float(cost) == pytest.approx(6.119001823, rel=1e-9)
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_in_single_precision_it_finds_the_same_optimum(tmp_path: Path) -> None:
+    status, cost, violation, _ = run(quadrotor(), tmp_path, "float", "2, 0, 1, 1, 0.05f, 0.4f", *STRICT)
+    assert status in "01"
+    assert float(cost) == pytest.approx(6.119, rel=2e-3)
+    assert float(violation) < 1e-3
+
+
+def test_the_core_is_one_text_and_neither_allocates_nor_keeps_state() -> None:
+    texts = [render_solver(solver_view(make().data, second_order=False)[0]) for make in (car, satellite)]
+    assert texts[0][CORE] == texts[1][CORE]
+    for files in texts:
+        for text in files.values():
+            assert "malloc" not in text
+
+        assert [line for line in files[CORE].splitlines() if line.startswith("static") and "(" not in line] == []
