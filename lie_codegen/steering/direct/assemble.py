@@ -94,7 +94,7 @@ def constant_pieces(task: Manoeuvre, pieces: int) -> Programme:
         for k in range(pieces):
             rows += _pair(task, k * h, h)
         table = _stacked(rows)
-    return _programme(task, table, slot, share, np.ones(pieces))
+    return programme_of(task, table, slot, share, np.ones(pieces))
 
 
 def linear_pieces(task: Manoeuvre, pieces: int, speed: float) -> Programme:
@@ -118,7 +118,7 @@ def linear_pieces(task: Manoeuvre, pieces: int, speed: float) -> Programme:
         table = _stacked(rows)
     mass = np.ones(pieces + 1)
     mass[[0, -1]] = 0.5
-    return _programme(task, table, slot, share, mass)
+    return programme_of(task, table, slot, share, mass)
 
 
 def _sampled(task: Manoeuvre, t: Array) -> tuple[Array, Array]:
@@ -141,7 +141,9 @@ def _stacked(rows: list[tuple[Array, Array]]) -> tuple[Array, Array, Array]:
     return np.array([row[0] for row in rows]), np.array([row[1] for row in rows]), np.arange(len(rows))
 
 
-def _programme(task: Manoeuvre, table: tuple[Array, Array, Array], slot: Array, share: Array, mass: Array) -> Programme:
+def programme_of(
+    task: Manoeuvre, table: tuple[Array, Array, Array], slot: Array, share: Array, mass: Array
+) -> Programme:
     """The programme, with the free motions of the goal as exponentials of their own, without bounds or cost."""
     system, m = task.system, task.controls
     group, n = system.group, len(mass)

@@ -9,6 +9,7 @@ import numpy as np
 
 from lie_codegen.errors import SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.direct.least_time import MOST_CONTROLS
 from lie_codegen.steering.direct.method import direct
 from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.plan import Plan
@@ -28,7 +29,16 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
         return True
     if any(not isinstance(each, str | int | np.integer) for each in controls) or callable(options.get("drift")):
         return True
-    return bool(given & _SURER) and given <= _options() and options.get("objective", "energy") == "energy"
+    if not given & _SURER or not given <= _options():
+        return False
+    objective = options.get("objective", "energy")
+    return objective == "energy" or (objective == "time" and _bounded(options.get("bounds"), controls))
+
+
+def _bounded(bounds: Any, controls: Sequence[Any]) -> bool:
+    """Whether every one of few controls is bounded, as words of arcs need it."""
+    some = not isinstance(bounds, Mapping) or len(bounds) == len(controls)
+    return bounds is not None and some and len(controls) <= MOST_CONTROLS
 
 
 def direct_plan(

@@ -14,25 +14,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InfeasibleError, ShapeError, SteeringError, SteeringInputError
-from lie_codegen.flow.metric import distance, group_element
+from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.constraints import box_limits
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces
 from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.guess import guessed
-from lie_codegen.steering.direct.inputs import Drive
+from lie_codegen.steering.direct.least_time import least_time
 from lie_codegen.steering.direct.polish import Flown, PolishError, as_inputs, corrected, flown, polished, refined
 from lie_codegen.steering.direct.programme import Machine, Settings
 from lie_codegen.steering.direct.reach import require_reach
+from lie_codegen.steering.direct.report import cost_of, plan_of
+from lie_codegen.steering.direct.robust import robust
 from lie_codegen.steering.direct.search import Budget, Found, search
 from lie_codegen.steering.direct.system import System, controls_of, velocity
-from lie_codegen.steering.goals import GoalSet, end_of
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.goals import end_of
+from lie_codegen.steering.plan import Plan, Status
 
 Array = NDArray[Any]
 
-_OBJECTIVES = ("energy", "fuel")
+_OBJECTIVES = ("energy", "fuel", "time")
 _FUEL_TIMES = 4
 
 
@@ -50,31 +52,36 @@ def direct(
     start: ArrayLike | None = None,
     equation: str = "left",
     guess: Any = None,
+    spread: Sequence[Any] | None = None,
     starts: int = 16,
     rounds: int = 4,
     pieces: int | None = None,
     iterations: int = 150,
     seed: int = 0,
     polish: bool = True,
+    longest: float = 20.0,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
-    """Least energy or fuel within bounds, from many starts.
+    """Least energy, fuel or time within bounds, from many starts.
 
     Args:
         group, target, controls, duration, tolerance: as `steer`; a control may be a vector (n,), n formulas of t, or a function of t.
         drift: (n,) velocity that is there without controls, n formulas of t, or a function of t.
         bounds: of the controls: a number (both signs), a (low, high) pair, or {label: either}.
         weights: (m,) positive w_i of the objective, ones if not given.
-        objective: "energy", int sum w u^2 dt, or "fuel", int sum w |u| dt.
+        objective: "energy", int sum w u^2 dt; "fuel", int sum w |u| dt; "time", the duration, of which the given one is a guess.
         start: (d, d) X(0), the identity if not given.
         equation: "left", X' = X hat(u); "right", X' = hat(u) X, as Schroedinger's equation.
         guess: controls to start from beside the others: a Plan, a function of t, or samples (k, m) at equal times.
+        spread: systems that shall all end at the goal under the same controls, {"drift": added to the common one, "gain": of the
+            controls} each; then the plan is the one of least squared errors, and details["worst_infidelity"] (gates) tells how good.
         starts: first guesses a round.
         rounds: rounds, with new guesses, before the goal counts as not found.
         pieces: of constant controls in the search, 48 (32 on large groups) if not given.
         iterations: most steps of each start in each stage.
         seed: of the guesses; the same seed, the same answer.
         polish: whether the controls become continuous (energy); else they stay constant on each piece.
+        longest: for "time": the longest duration allowed, in units of the given one.
         progress: called with one line a stage.
 
     Raises:
@@ -87,10 +94,16 @@ def direct(
     began = time.perf_counter()
     _check(objective, equation, starts, rounds, pieces, iterations, tolerance)
     task = manoeuvre(group, target, controls, duration, drift, bounds, weights, start, equation)
+    if objective == "time":
+        limits = Settings(True, iterations, iterations)
+        return least_time(task, target, tolerance, limits, starts, rounds, seed, longest, say)
+    count = _pieces(task) if pieces is None else pieces
+    if spread is not None:
+        guesses = guessed(task, guess, count)
+        return robust(task, target, tolerance, spread, starts, count, iterations, seed, guesses, say)
     proof = certificate(task)
     if proof is not None:
         raise InfeasibleError(f"steer({group.name}): infeasible: {proof}", certificate=proof)
-    count = _pieces(task) if pieces is None else pieces
     settings = Settings(objective == "fuel", iterations, iterations)
     budget = Budget(starts, rounds, count, seed, settings)
     solver = machine(group, task.controls)
@@ -160,83 +173,6 @@ def manoeuvre(
         raise SteeringInputError(f"{where}: weights must be positive, got {w.tolist()}")
     require_reach(system, float(duration), end)
     return Manoeuvre(system, end, float(duration), low, high, w)
-
-
-def plan_of(
-    task: Manoeuvre,
-    target: Any,
-    found: Flown,
-    variant: int,
-    tolerance: float,
-    objective: str,
-    details: dict[str, Any],
-    seconds: dict[str, float],
-    status: Status | None = None,
-) -> Plan:
-    """The plan of inputs that were flown; its error is the true system's."""
-    system, group = task.system, task.system.group
-    error = error_at(task, found, variant)
-    inputs = found.inputs
-    over = max(
-        0.0,
-        float(
-            np.max([inputs.first - task.high, task.low - inputs.first, inputs.last - task.high, task.low - inputs.last])
-        ),
-    )
-    aim = task.end.elements[variant] if task.end.elements is not None else found.X
-    steady = inputs.knots[1:-1]
-    return Plan(
-        group=group,
-        target=aim,
-        controls=system.labels,
-        duration=float(inputs.knots[-1]),
-        method="direct",
-        u=Controls(Drive(system, inputs), steady),
-        cost=cost_of(task, inputs, objective)
-        if objective == "fuel"
-        else inputs.integral_of_squares(np.ones(task.controls)),
-        X_final=found.X,
-        error=error,
-        status=status or (Status.LOCAL if error <= tolerance else Status.NOT_CONVERGED),
-        seconds=seconds,
-        details={
-            "goal": target if isinstance(target, GoalSet) else aim,
-            "inputs": inputs,
-            "system": system,
-            "violation": {"end": error, "bound": over},
-            "objective_value": cost_of(task, inputs, objective),
-            "weights": task.weights,
-            "control_peaks": inputs.peaks(),
-            "fidelity": fidelity(task, found.X, variant),
-            **details,
-        },
-    )
-
-
-def error_at(task: Manoeuvre, found: Flown, variant: int) -> float:
-    """|log(T^-1 X)| where the goal is an element up to free motions, else the distance of what the goal prescribes."""
-    end = task.end
-    if end.elements is None:
-        scale = float(np.max(np.abs(end.left)))
-        return found.miss / scale
-    return distance(task.system.group, end.elements[variant], found.free[0] @ found.X @ found.free[1])
-
-
-def fidelity(task: Manoeuvre, X: Array, variant: int) -> float | None:
-    """|tr(U^H X)|^2 / d^2 of unitary groups, None on others: one for the gate up to its phase."""
-    elements, d = task.end.elements, task.system.group.degree
-    if elements is None or not task.system.group.is_complex:
-        return None
-    return float(np.abs(np.vdot(elements[variant], X)) ** 2 / d**2)
-
-
-def cost_of(task: Manoeuvre, inputs: Any, objective: str) -> float:
-    """The objective of inputs."""
-    if objective == "time":
-        return float(inputs.knots[-1])
-    return float(
-        inputs.integral_of_sizes(task.weights) if objective == "fuel" else inputs.integral_of_squares(task.weights)
-    )
 
 
 def _smoother(

@@ -1,0 +1,284 @@
+"""objective="time": words of arcs with constant controls, X = X0 exp(s_1 V_1) ... exp(s_K V_K), least sum of the durations s_k >= 0.
+
+With a drift, the durations that reach a goal may have gaps (a Dubins car returns to a pose beside it after a full turn, not a
+little later): there is no bisection over the duration. The letters V are drift + sum u_i b_i with each control at a bound or zero
+(the singular arcs of straight motion); words of as many arcs as the group has dimensions, all of them where they are few, and
+longer words of which the descent drops arcs, as the limits at zero do with an objective that is a sum.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
+from lie_codegen.steering.direct.compiled import machine
+from lie_codegen.steering.direct.flight import fly
+from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.polish import Flown
+from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Settings, chosen
+from lie_codegen.steering.direct.report import plan_of
+from lie_codegen.steering.direct.search import threshold
+from lie_codegen.steering.plan import Plan
+
+Array = NDArray[Any]
+
+#: Words of n arcs are all tried up to that many; else as many drawn at random.
+_MOST_WORDS = 1024
+#: Random durations of each word, at least; lanes in all, at most.
+_EACH, _MOST_LANES = 2, 4096
+#: Arcs of a long word, in units of the group's dimension.
+_LONG = 3
+_KEPT = 64
+_GONE = 1e-9
+_AGREEING = 1e-3
+#: Starts that must agree on the shortest before another round is not tried.
+_ENOUGH = 3
+MOST_CONTROLS = 4
+
+
+def least_time(
+    task: Manoeuvre,
+    target: Any,
+    tolerance: float,
+    settings: Settings,
+    starts: int,
+    rounds: int,
+    seed: int,
+    longest: float,
+    say: Callable[[str], None],
+) -> Plan:
+    """The plan of least duration found; `task.duration` is the unit of the first guesses, and of `longest`.
+
+    Raises:
+        SteeringInputError: controls without bounds, or a system that depends on time.
+        SteeringError: no word of arcs was found that reaches the goal.
+    """
+    began = time.perf_counter()
+    letters, velocities = _letters(task)
+    solver = machine(task.system.group, 1)
+    arcs = replace(task, low=np.zeros(1), high=np.ones(1), weights=np.ones(1))
+    limits = _limits(task, velocities, longest)
+    tried: list[str] = []
+    best: list[tuple[float, Array, Array, int]] = []
+    total = reached = agree = 0
+    n = task.system.group.dim
+    for round_ in range(rounds):
+        rng = np.random.default_rng([seed, round_, 11])
+        long = _LONG * n * (1 + round_)
+        bangs = np.flatnonzero(np.all(letters != 0, axis=1))
+        for name, words in (
+            ("short words", _short_words(len(letters), n, starts, rng)),
+            ("long words", _long_words(len(letters), long, 4 * starts, rng)),
+            ("long words without zeros", bangs[_long_words(len(bangs), long, 2 * starts, rng)]),
+        ):
+            found = _solve(arcs, solver, velocities, limits, words, settings, longest, rng)
+            total += len(words)
+            reached += len(found)
+            tried.append(
+                f"round {round_ + 1}: {len(found)} of {len(words)} starts of {name} ({words.shape[1]} arcs) arrive"
+            )
+            say(tried[-1])
+            best += found
+        best.sort(key=lambda each: each[0])
+        agree = sum(each[0] <= best[0][0] * (1 + _AGREEING) for each in best)
+        if agree >= _ENOUGH:
+            break
+    if not best:
+        raise SteeringError(
+            f"steer({task.system.group.name}): no word of up to {_LONG * n * rounds} arcs was found that reaches the goal within {longest:g} times "
+            f"the given duration, from {total} starts ({rounds} rounds, seed {seed}), which proves nothing; more starts, another seed, "
+            "a larger `longest`"
+        )
+    for _, word, durations, variant in best[:_KEPT]:
+        flown, sequence = _flown(task, letters, word, durations, variant)
+        if flown.miss <= max(1e-9, 1e-2 * tolerance):
+            break
+    details = {
+        "winner": "direct, words of arcs",
+        "objective": "time",
+        "tried": tuple(tried),
+        "starts": total,
+        "reached": reached,
+        "agree": agree,
+        "seed": seed,
+        "arcs": sequence,
+        "discretisation": "none: arcs of constant controls",
+        "compiled": solver.compiled,
+        "optimality": f"a local minimum of the duration, the shortest of {reached} starts that arrived; {agree} ended within 0.1 % of it",
+    }
+    if task.end.phases:
+        details["phase"] = task.end.phases[variant]
+    return plan_of(task, target, flown, variant, tolerance, "time", details, {"solve": time.perf_counter() - began})
+
+
+def _letters(task: Manoeuvre) -> tuple[Array, Array]:
+    """(L, m) controls at a bound or zero, and hat of the velocities they make in the unit of the given duration (L, d, d)."""
+    name = task.system.group.name
+    if not task.system.steady:
+        raise SteeringInputError(
+            f'steer({name}): objective="time" needs controls and a drift that do not depend on time'
+        )
+    unbounded = [
+        label for label, a, b in zip(task.system.labels, task.low, task.high, strict=True) if not np.isfinite(b - a)
+    ]
+    if unbounded:
+        raise SteeringInputError(f'steer({name}): objective="time" needs bounds; {", ".join(unbounded)} has none')
+    if task.controls > MOST_CONTROLS:
+        raise SteeringInputError(
+            f'steer({name}): objective="time" takes at most {MOST_CONTROLS} controls, got {task.controls}'
+        )
+    choices = [(a, 0.0, b) if a < 0 < b else (a, b) for a, b in zip(task.low, task.high, strict=True)]
+    letters = np.array(list(product(*choices)))
+    velocities = task.system.group.hat(task.duration * task.system.velocity(np.zeros(len(letters)), letters))
+    moving = np.max(np.abs(velocities), axis=(1, 2)) > 0
+    return letters[moving], velocities[moving]
+
+
+def _limits(task: Manoeuvre, velocities: Array, longest: float) -> Array:
+    """(L,) longest useful duration of each letter: its period, where exp(s V) returns to the identity."""
+    limits = np.full(len(velocities), float(longest))
+    for number, V in enumerate(velocities):
+        rates = np.abs(np.linalg.eigvals(V).imag)
+        rates = rates[rates > 1e-9]
+        if len(rates):
+            turns = 2 * np.pi / np.min(rates) * np.arange(1, 5)
+            back = expm(turns[:, None, None] * V)
+            home = np.max(np.abs(back - np.eye(len(V))), axis=(1, 2)) < 1e-9
+            if np.any(home):
+                limits[number] = min(longest, float(turns[np.argmax(home)]))
+    return limits
+
+
+def _short_words(letters: int, arcs: int, starts: int, rng: np.random.Generator) -> Array:
+    """(lanes, arcs) all words without the same letter twice in a row, repeated; or some of them."""
+    count = letters * max(letters - 1, 1) ** (arcs - 1)
+    if count > _MOST_WORDS:
+        return _long_words(letters, arcs, _MOST_WORDS * _EACH, rng)
+    words = np.array([w for w in product(range(letters), repeat=arcs) if all(a != b for a, b in pairwise(w))])
+    if not len(words):
+        words = np.zeros((1, arcs), int)
+    return np.repeat(words, min(max(_EACH, starts), max(_EACH, _MOST_LANES // len(words))), axis=0)
+
+
+def _long_words(letters: int, arcs: int, lanes: int, rng: np.random.Generator) -> Array:
+    """(lanes, arcs) random words without the same letter twice in a row."""
+    words = rng.integers(0, letters, (lanes, arcs))
+    for k in range(1, arcs if letters > 1 else 0):
+        words[:, k] = (words[:, k - 1] + rng.integers(1, letters, lanes)) % letters
+    return words
+
+
+def _solve(
+    arcs: Manoeuvre,
+    solver: Machine,
+    velocities: Array,
+    limits: Array,
+    words: Array,
+    settings: Settings,
+    longest: float,
+    rng: np.random.Generator,
+) -> list[tuple[float, Array, Array, int]]:
+    """(duration, word, durations, variant) of words that reach the goal, the shortest of them descended."""
+    lanes, count = words.shape
+    programme = _words_programme(arcs, velocities, words, longest)
+    variant = np.arange(lanes) % len(arcs.end.values)
+    # durations that add up to between a third and three times the given one
+    parts = rng.dirichlet(np.ones(count), lanes) * (3.0 ** rng.uniform(-1, 1, (lanes, 1)))
+    parts = np.minimum(parts, limits[words])
+    before, after = arcs.free_slots
+    u = np.concatenate([np.zeros((lanes, before)), parts, np.zeros((lanes, after))], axis=1)[..., None]
+    u[:, :before, 0] = rng.uniform(-np.pi, np.pi, (lanes, before))
+    u[:, before + count :, 0] = rng.uniform(-np.pi, np.pi, (lanes, after))
+    goal = arcs.goal(variant)
+    found = solver.reach(programme, goal, u, replace(settings, reach_iterations=min(60, settings.reach_iterations)))
+    there = np.flatnonzero(found.size <= threshold(arcs, settings))
+    length = np.sum(np.minimum(arcs.own(found.u)[..., 0], limits[words]), axis=1)
+    there = there[np.argsort(length[there], kind="stable")][:_KEPT]
+    if not len(there):
+        return []
+    part, aim = chosen(programme, goal, there)
+    lower = solver.descend(part, aim, found.u[there], settings)
+    results = []
+    for lane, number in enumerate(there):
+        word, durations, size = _tidied(
+            arcs, solver, velocities, limits, words[number], lower.u[lane], int(variant[number]), settings, longest
+        )
+        if size <= threshold(arcs, settings) and np.sum(arcs.own(durations)) <= longest:
+            results.append((float(np.sum(arcs.own(durations))), word, durations, int(variant[number])))
+    return results
+
+
+def _words_programme(arcs: Manoeuvre, velocities: Array, words: Array, longest: float) -> Programme:
+    """Arcs as exponentials of one control each, their duration."""
+    lanes, count = words.shape
+    table = (np.zeros_like(velocities), velocities[:, None], np.zeros(count, int))
+    limited = replace(arcs, high=np.full(1, longest))
+    programme = programme_of(limited, table, np.arange(count), np.tile([1.0, 0.0], (count, 1)), np.ones(count))
+    entry = np.repeat(programme.entry, lanes, axis=0)
+    before = arcs.free_slots[0]
+    entry[:, before : before + count] = words
+    return replace(programme, entry=entry)
+
+
+def _tidied(
+    arcs: Manoeuvre,
+    solver: Machine,
+    velocities: Array,
+    limits: Array,
+    word: Array,
+    u: Array,
+    variant: int,
+    settings: Settings,
+    longest: float,
+) -> tuple[Array, Array, float]:
+    """The word without empty arcs, full turns and repeated letters, brought to the goal again; the residual."""
+    before, after = arcs.free_slots
+    durations = arcs.own(u)[:, 0]
+    turns = limits[word] < longest
+    durations = np.where(turns, np.mod(durations, np.where(turns, limits[word], 1.0)), durations)
+    durations = np.where(turns & (limits[word] - durations < _GONE), 0.0, durations)
+    letters: list[int] = []
+    lengths: list[float] = []
+    for letter, length in zip(word, durations, strict=True):
+        if length <= _GONE:
+            continue
+        if letters and letters[-1] == letter:
+            lengths[-1] += length
+        else:
+            letters.append(int(letter))
+            lengths.append(float(length))
+    if not letters:
+        letters, lengths = [int(word[0])], [0.0]
+    kept = np.array(letters)
+    short = np.concatenate([u[:before], np.array(lengths)[:, None], u[len(u) - after :]])
+    programme = _words_programme(arcs, velocities, kept[None], longest)
+    goal: Goal = arcs.goal(np.array([variant]))
+    found = solver.reach(programme, goal, short[None], replace(settings, damping=1e-9, reach_iterations=12))
+    return kept, found.u[0], float(found.size[0])
+
+
+def _flown(
+    task: Manoeuvre, letters: Array, word: Array, u: Array, variant: int
+) -> tuple[Flown, tuple[tuple[float, ...], ...]]:
+    """The arcs as inputs of the system's own time, flown; and (controls ..., duration) of each arc in that order."""
+    one = replace(task, low=np.zeros(1), high=np.ones(1), weights=np.ones(1))
+    durations = one.own(u)[:, 0] * task.duration
+    values = letters[word]
+    if task.system.right:
+        durations, values = durations[::-1], values[::-1]
+    knots = np.concatenate([[0.0], np.cumsum(durations)])
+    inputs = Inputs.constant(knots, values)
+    X = fly(Drive(task.system, inputs))[1][-1]
+    left, right = one.free_motions(u)
+    miss = task.end.left @ left @ X @ right @ task.end.right - task.end.values[variant]
+    sequence = tuple((*map(float, controls), float(s)) for controls, s in zip(values, durations, strict=True))
+    return Flown(inputs, X, float(np.linalg.norm(miss)), (left, right)), sequence

@@ -1,0 +1,94 @@
+"""From controls that were flown to a Plan: error, violations, cost, fidelity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.flow.metric import distance
+from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.polish import Flown
+from lie_codegen.steering.goals import GoalSet
+from lie_codegen.steering.plan import Controls, Plan, Status
+
+Array = NDArray[Any]
+
+
+def plan_of(
+    task: Manoeuvre,
+    target: Any,
+    found: Flown,
+    variant: int,
+    tolerance: float,
+    objective: str,
+    details: dict[str, Any],
+    seconds: dict[str, float],
+    status: Status | None = None,
+) -> Plan:
+    """The plan of inputs that were flown; its error is the true system's."""
+    system, group = task.system, task.system.group
+    error = error_at(task, found, variant)
+    inputs = found.inputs
+    over = max(
+        0.0,
+        float(
+            np.max([inputs.first - task.high, task.low - inputs.first, inputs.last - task.high, task.low - inputs.last])
+        ),
+    )
+    aim = task.end.elements[variant] if task.end.elements is not None else found.X
+    steady = inputs.knots[1:-1]
+    return Plan(
+        group=group,
+        target=aim,
+        controls=system.labels,
+        duration=float(inputs.knots[-1]),
+        method="direct",
+        u=Controls(Drive(system, inputs), steady),
+        cost=cost_of(task, inputs, objective)
+        if objective == "fuel"
+        else inputs.integral_of_squares(np.ones(task.controls)),
+        X_final=found.X,
+        error=error,
+        status=status or (Status.LOCAL if error <= tolerance else Status.NOT_CONVERGED),
+        seconds=seconds,
+        details={
+            "goal": target if isinstance(target, GoalSet) else aim,
+            "inputs": inputs,
+            "system": system,
+            "violation": {"end": error, "bound": over},
+            "objective_value": cost_of(task, inputs, objective),
+            "weights": task.weights,
+            "control_peaks": inputs.peaks(),
+            "fidelity": fidelity(task, found.X, variant),
+            **details,
+        },
+    )
+
+
+def error_at(task: Manoeuvre, found: Flown, variant: int) -> float:
+    """|log(T^-1 X)| where the goal is an element up to free motions, else the distance of what the goal prescribes."""
+    end = task.end
+    if end.elements is None:
+        scale = float(np.max(np.abs(end.left)))
+        return found.miss / scale
+    return distance(task.system.group, end.elements[variant], found.free[0] @ found.X @ found.free[1])
+
+
+def fidelity(task: Manoeuvre, X: Array, variant: int) -> float | None:
+    """|tr(U^H X)|^2 / d^2 of unitary groups, None on others: one for the gate up to its phase."""
+    elements, d = task.end.elements, task.system.group.degree
+    if elements is None or not task.system.group.is_complex:
+        return None
+    return float(np.abs(np.vdot(elements[variant], X)) ** 2 / d**2)
+
+
+def cost_of(task: Manoeuvre, inputs: Inputs, objective: str) -> float:
+    """The objective of inputs."""
+    if objective == "time":
+        return float(inputs.knots[-1])
+    return float(
+        inputs.integral_of_sizes(task.weights) if objective == "fuel" else inputs.integral_of_squares(task.weights)
+    )
