@@ -19,6 +19,7 @@ _FRONT_DOOR = {
     "MatrixGroup": "lie_codegen.groups.matrix_group",
     "product": "lie_codegen.groups.products",
     "semidirect": "lie_codegen.groups.products",
+    "pauli": "lie_codegen.groups.pauli",
     "change_of_basis": "lie_codegen.groups.change_of_basis",
     "structure": "lie_codegen.groups.structure",
     "wei_norman": "lie_codegen.groups.wei_norman.matrix",

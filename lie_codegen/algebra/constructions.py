@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.algebra.orthogonal_basis import orthogonal_table
 from lie_codegen.errors import AlgebraError, DependentBasisError, InputError, NotClosedError
 from lie_codegen.exact.numbers import Number, domain_matrix, exact_number, real_coordinates, to_numbers
 
@@ -66,6 +67,9 @@ def algebra_from_matrices(name: str, labels: Sequence[str], matrices: Sequence[s
     if len(labels) != len(matrices):
         raise InputError(f"{name}: {len(labels)} labels for {len(matrices)} matrices")
     columns = [real_coordinates(matrix) for matrix in matrices]
+    quickly = orthogonal_table(matrices, columns)
+    if quickly is not None:
+        return LieAlgebra(name, labels, quickly)
     pivots, inverse = _coordinate_map(name, labels, columns)
     table = {}
     for i, j in combinations(range(len(labels)), 2):
