@@ -1,18 +1,19 @@
 """C sources of the catalogue's kernels that ship with the package: neither SymPy nor CasADi is needed to build them.
 
-    prebuilt/index.json        digest of a definition -> name; the files that determine the C text, and their digest
-    prebuilt/<name>.json.xz    the sources of each kernel of the group
+    prebuilt/index.json        digest of a definition -> name; name -> digest of what its sources are made from
+    prebuilt/<name>.json.xz    the sources of each kernel of the group; the functions of the package that ran to make them
     prebuilt/lanes.json.xz     the file they all include
 
-What does not match, to the byte, the definition asked for and the source of this package is not used. Written by
-tests/tools/prebuild.py.
+What was made by other code than this package's, or of another definition, is not used. Written by tests/tools/prebuild.py.
+Each group is judged by itself, by the functions that ran (codegen/made_from.py). That takes a fifth of a second, and is
+not done where all files are, to the byte, those at the time of writing, as in an installed package.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 #: The file that every kernel includes, and the name it is stored by.
 SHARED, SHARED_STORE = "lie_codegen_lanes.h", "lanes"
+#: What becomes C text beside the functions.
+TEMPLATES = ("binding.c.jinja", "header.h.jinja", "lanes.h.jinja", "macros.jinja", "source.c.jinja")
 _PACKAGE = Path(__file__).resolve().parent.parent
 
 
@@ -55,11 +58,15 @@ def find_prebuilt(definition: str, folder: Path | None = None) -> Prebuilt | Non
     try:
         index = json.loads((home / "index.json").read_bytes())
         name = index["definitions"].get(digest(definition))
-        if name is None or source_digest(index["files"]) != index["sha256"]:
+        if name is None:
             return None
         data, shared = (_unpacked(home, each, index["stores"][each]) for each in (name, SHARED_STORE))
+        if file_digest(index["files"]) != index["sha256"] and (
+            made_from_digest(data["made_from"]) != index["made_from"][name]
+        ):
+            return None
         return Prebuilt(str(data["namespace"]), tuple(data["kernels"]), data["kernels"], shared)
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError, SyntaxError):
         return None
 
 
@@ -68,8 +75,8 @@ def prebuilt_folder() -> Path:
     return _PACKAGE / "prebuilt"
 
 
-def source_digest(files: Iterable[str]) -> str:
-    """Digest of files of the package, given by their paths in it; templates by theirs after "templates/".
+def file_digest(files: Iterable[str]) -> str:
+    """Digest of the bytes of files of the package, given by their paths in it; templates by theirs after "templates/".
 
     Raises:
         OSError: one is not there.
@@ -83,6 +90,18 @@ def source_digest(files: Iterable[str]) -> str:
         summary.update(f"{name}\0{len(content)}\0".encode())
         summary.update(content)
     return summary.hexdigest()
+
+
+def made_from_digest(ran: Mapping[str, Sequence[str]]) -> str:
+    """Digest of the functions {module file: [those that ran]} and of the templates.
+
+    Raises:
+        OSError: a file is not there.
+        SyntaxError: a file is not Python.
+    """
+    from lie_codegen.codegen.made_from import source_digest
+
+    return digest([source_digest(_PACKAGE, ran), file_digest(f"templates/{name}" for name in TEMPLATES)])
 
 
 def _unpacked(home: Path, name: str, expected: str) -> Any:

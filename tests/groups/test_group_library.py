@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def current() -> None:
     """Skip where the store is out of date: one test says so, and what to do."""
-    if index()["sha256"] != prebuilt.source_digest(index()["files"]):
+    if {*FAST} & {*prebuild.stale(prebuilt_folder())}:
         pytest.skip(COMMAND)
 
 
@@ -226,8 +227,7 @@ def test_a_group_of_ones_own_is_loaded_without_sympy_and_casadi(home: Path, tmp_
 
 def test_the_store_is_current() -> None:
     data = index()
-    assert data["files"] == prebuild.source_files(), COMMAND
-    assert data["sha256"] == prebuilt.source_digest(data["files"]), COMMAND
+    assert prebuild.stale(prebuilt_folder()) == [], COMMAND
     expected = {digest(each): name for name in lc.group_names() for each in prebuild.definitions_of(name)}
     assert data["definitions"] == expected, COMMAND
     assert set(data["stores"]) == {*lc.group_names(), prebuilt.SHARED_STORE}
@@ -237,9 +237,9 @@ def test_the_store_is_current() -> None:
 
 @pytest.mark.parametrize("name", FAST)
 def test_the_store_holds_what_the_generator_writes(name: str) -> None:
-    store, shared = prebuild.store_of(lc.group(name))
-    assert prebuild.unpack(prebuilt_folder() / f"{name}.json.xz") == store, COMMAND
-    assert prebuild.unpack(prebuilt_folder() / f"{prebuilt.SHARED_STORE}.json.xz") == shared, COMMAND
+    made = prebuild.derived(name)
+    assert prebuild.unpack(prebuilt_folder() / f"{name}.json.xz") == made["store"], COMMAND
+    assert prebuild.unpack(prebuilt_folder() / f"{prebuilt.SHARED_STORE}.json.xz") == made["shared"], COMMAND
 
 
 @pytest.mark.slow
@@ -275,7 +275,10 @@ def test_what_does_not_match_is_not_used(tmp_path: Path, monkeypatch: pytest.Mon
     assert find_prebuilt(by_name("so3"), folder) is None
     assert find_prebuilt(by_name("se2"), folder) is not None
     data = index()
-    for wrong in ({**data, "sha256": "0" * 64}, {**data, "files": [*data["files"], "gone.py"]}, {}, []):
+    wrong_bytes = {**data, "sha256": "0" * 64}
+    (folder / "index.json").write_text(json.dumps(wrong_bytes))
+    assert find_prebuilt(by_name("se2"), folder) is not None  # other bytes, the same functions
+    for wrong in ({**wrong_bytes, "made_from": {"se2": "0" * 64}}, {**data, "files": ["gone.py"]}, {}, []):
         (folder / "index.json").write_text(json.dumps(wrong))
         assert find_prebuilt(by_name("se2"), folder) is None
     (folder / "index.json").unlink()
@@ -283,18 +286,44 @@ def test_what_does_not_match_is_not_used(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.usefixtures("current")
-def test_one_changed_byte_of_the_source_makes_the_store_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edit_makes_those_groups_stale_that_are_made_from_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     package = tmp_path / "lie_codegen"
-    for name in index()["files"]:
-        if not name.startswith("templates/"):
-            (package / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(Path(lc.__file__).parent / name, package / name)
+    shutil.copytree(Path(lc.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(prebuilt, "_PACKAGE", package)
-    folder = Path(lc.__file__).parent / "prebuilt"
-    assert find_prebuilt(by_name("so3"), folder) is not None
-    changed = package / "groups" / "kernels.py"
-    changed.write_text(changed.read_text() + "#")
-    assert find_prebuilt(by_name("so3"), folder) is None
+    folder = package / "prebuilt"
+
+    def stale_after(file: str, edit: Callable[[str], str]) -> set[str]:
+        path = package / file
+        text = path.read_text()
+        assert edit(text) != text
+        path.write_text(edit(text))
+        stale = {name for name in ("so3", "h3") if find_prebuilt(by_name(name), folder) is None}
+        assert find_prebuilt(by_name("se2") + " ", folder) is None
+        path.write_text(text)
+        return stale
+
+    assert stale_after("groups/kernels.py", lambda text: text + "# a remark\n") == set()
+    assert stale_after("groups/kernels.py", lambda text: text.replace('"""', '"""About ', 1)) == set()
+    assert (
+        stale_after("groups/kernels.py", lambda text: text + "\ndef fresh():\n    return _mine\n_mine = 3\n") == set()
+    )
+    assert stale_after("averaging/magnus.py", lambda text: text + "\nraise ValueError\n") == set()
+    assert stale_after("groups/kernels.py", lambda text: text + "\ndef _matrix(data, name):\n    return 0\n") == {
+        "so3",
+        "h3",
+    }
+    assert stale_after("groups/kernels.py", lambda text: text + "\ndel _MAKERS['log']\n") == {"so3", "h3"}
+    assert stale_after(
+        "groups/kernels.py", lambda text: text.replace("exp_matrix, jacobian", "exp_matrix, ad_body as jacobian")
+    ) == {
+        "so3",
+        "h3",
+    }
+    assert stale_after("groups/maps/log_blocks.py", lambda text: text.replace("1 + ops.sqrt", "2 + ops.sqrt")) == {
+        "so3"
+    }
 
 
 def test_a_stale_store_changes_nothing_but_time(
