@@ -5,7 +5,7 @@ A text depends on
 
 - the bodies of the functions that ran while it was made: observed, not guessed;
 - the statements of every module that was imported, for they ran too;
-- of what only binds a name (an import, a plain constant, a function that did not run) on those whose name is mentioned by
+- of what only binds a name (an import, a plain constant, a class, a function that did not run) on those whose name is mentioned by
   some of the above: the others could come or go unnoticed. To mention is to use as a variable, an attribute, a keyword
   or a text (`getattr`); special methods count as mentioned, for operators call them.
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -32,12 +32,14 @@ class _Part:
     """A piece of a file.
 
     Attributes:
+        within: the outermost class around it; None in the module.
         function: qualified name, where it is the body of a function, which counts if it ran.
         binds: names, where it does nothing but bind them; None for a statement that counts always.
         text: its syntax tree, written out.
         mentions: identifiers in it.
     """
 
+    within: str | None
     function: str | None
     binds: frozenset[str] | None
     text: str
@@ -57,55 +59,65 @@ def source_digest(folder: Path, ran: Mapping[str, Sequence[str]]) -> str:
     """
     kept: list[tuple[str, str]] = []
     waiting: list[tuple[str, _Part]] = []
-    mentioned: set[str] = set()
+    # A class whose method ran counts, wherever its name came from.
+    mentioned = {name.split(".")[0] for functions in ran.values() for name in functions}
+
+    def keep(found: Iterable[tuple[str, _Part]]) -> None:
+        for name, part in found:
+            kept.append((name, part.text))
+            mentioned.update(part.mentions)
+
     for name, functions in ran.items():
-        for part in _parts((folder / name).read_text(encoding="utf-8")):
-            if part.function in functions or (part.function is None and part.binds is None):
-                kept.append((name, part.text))
-                mentioned |= part.mentions
-            elif part.binds is not None:
-                waiting.append((name, part))
-    # What is kept mentions names that others bind: until nothing more is found.
-    while meant := [each for each in waiting if each[1].binds and not mentioned.isdisjoint(each[1].binds)]:
-        kept += [(name, part.text) for name, part in meant]
-        mentioned = mentioned.union(*(part.mentions for _, part in meant))
-        waiting = [each for each in waiting if each not in meant]
+        parts = _parts((folder / name).read_text(encoding="utf-8"))
+        keep((name, part) for part in parts if part.function in functions)
+        waiting += [(name, part) for part in parts if part.function is None]
+    # What is kept mentions names that other parts bind: until nothing more is found.
+    while found := [each for each in waiting if _counts(each[1], mentioned)]:
+        waiting = [each for each in waiting if not _counts(each[1], mentioned)]
+        keep(found)
     return hashlib.sha256("\0".join(f"{name}\n{text}" for name, text in sorted(kept)).encode()).hexdigest()
+
+
+def _counts(part: _Part, mentioned: set[str]) -> bool:
+    around = part.within is None or part.within in mentioned
+    return around and (part.binds is None or not mentioned.isdisjoint(part.binds))
 
 
 @lru_cache(maxsize=512)
 def _parts(source: str) -> tuple[_Part, ...]:
     tree = ast.parse(source)
     _Plain().visit(tree)
-    return tuple(_walk(tree.body, ""))
+    return tuple(_walk(tree.body, None, ""))
 
 
-def _walk(statements: Sequence[ast.stmt], scope: str) -> Iterator[_Part]:
+def _walk(statements: Sequence[ast.stmt], within: str | None, scope: str) -> Iterator[_Part]:
     for node in statements:
         if isinstance(node, _FUNCTION):
-            yield _Part(scope + node.name, None, ast.dump(node), _mentions(node))
-            yield _head(node, scope)
+            yield _Part(within, scope + node.name, None, ast.dump(node), _mentions(node))
+            yield _head(node, within, scope)
         elif isinstance(node, ast.ClassDef):
+            # A class that nothing mentions does nothing: no class of the package is called when it is subclassed.
             inner, node.body = node.body, []
-            yield _Part(None, None, scope + ast.dump(node), _mentions(node))
-            yield from _walk(inner, f"{scope}{node.name}.")
+            yield _Part(within, None, frozenset([node.name]), scope + ast.dump(node), _mentions(node))
+            yield from _walk(inner, within or node.name, f"{scope}{node.name}.")
         elif isinstance(node, ast.Import | ast.ImportFrom):
             for alias in node.names:
                 # "import a as b" mentions a as well: another import may have bound it.
                 names = frozenset((alias.asname or alias.name).split(".")) | set(alias.name.split("."))
                 origin = getattr(node, "module", None)
-                yield _Part(None, names, f"{scope}{origin} {alias.name} {alias.asname}", names)
+                yield _Part(within, None, names, f"{scope}{origin} {alias.name} {alias.asname}", names)
         else:
-            yield _Part(None, _constants(node), scope + ast.dump(node), _mentions(node))
+            yield _Part(within, None, _constants(node), scope + ast.dump(node), _mentions(node))
 
 
-def _head(node: ast.FunctionDef | ast.AsyncFunctionDef, scope: str) -> _Part:
+def _head(node: ast.FunctionDef | ast.AsyncFunctionDef, within: str | None, scope: str) -> _Part:
     """That the function is there, its defaults and decorators: these are evaluated whether or not it runs."""
     own = ast.FunctionDef(scope + node.name, node.args, [], node.decorator_list)
-    binds = frozenset([node.name])
     wrapped = all(_mentions(each) & _WRAPPERS for each in node.decorator_list)
-    special = bool(scope) and node.name.startswith("__") and node.name.endswith("__")
-    return _Part(None, binds if wrapped and not special else None, ast.dump(own), _mentions(own))
+    special = bool(within) and node.name.startswith("__") and node.name.endswith("__")
+    return _Part(
+        within, None, frozenset([node.name]) if wrapped and not special else None, ast.dump(own), _mentions(own)
+    )
 
 
 def _constants(node: ast.stmt) -> frozenset[str] | None:

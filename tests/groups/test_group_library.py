@@ -309,6 +309,13 @@ def test_an_edit_makes_those_groups_stale_that_are_made_from_it(
     assert (
         stale_after("groups/kernels.py", lambda text: text + "\ndef fresh():\n    return _mine\n_mine = 3\n") == set()
     )
+    assert (
+        stale_after(
+            "errors.py",
+            lambda text: text + "\nclass FreshError(Exception):\n    def __str__(self):\n        return 1\n",
+        )
+        == set()
+    )
     assert stale_after("averaging/magnus.py", lambda text: text + "\nraise ValueError\n") == set()
     assert stale_after("groups/kernels.py", lambda text: text + "\ndef _matrix(data, name):\n    return 0\n") == {
         "so3",
