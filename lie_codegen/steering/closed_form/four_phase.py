@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
 from lie_codegen.flow.metric import matrix_log, second_kind
+from lie_codegen.steering.closed_form.free_amplitude import LineAndCircles, free_amplitude
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
@@ -32,11 +33,13 @@ from lie_codegen.steering.task import Task
 Array = NDArray[np.float64]
 
 _NEGLIGIBLE = 1e-12
+#: Periods that the paper's loops may take unasked; where gd_i gd_j is small they take any number, at any speed.
+_MOST_PERIODS = 16
 _ON_GROUP = 1e-8
 _FORMS = {"product": "coordinates of the second kind", "single": "coordinates of the logarithm"}
 
 
-def four_phase(task: Task, *, q: int | None = None, form: str = "product") -> Plan:
+def four_phase(task: Task, *, q: int | None = None, form: str = "product", amplitude: str = "auto") -> Plan:
     """The four-phase manoeuvre.
 
     Args:
@@ -45,13 +48,21 @@ def four_phase(task: Task, *, q: int | None = None, form: str = "product") -> Pl
         q: number of area-making periods; None takes the integer next to |gd_k / (pi c gd_i gd_j)|, so that psi is near
             45 degrees. More periods are more accurate and cost more energy.
         form: "product", coordinates of the second kind, or "single", the logarithm.
+        amplitude: "tied": the paper's, whose loops have the size of gd_i and gd_j; "free": a line, circles, a line back, for any target, see
+            `free_amplitude`; "auto": the paper's, and the free one where that would take more than 16 periods and none were asked for; zero coordinates are refused.
 
     Raises:
         SteeringInputError: where the scheme does not apply, with what to do instead.
     """
     started = time.perf_counter()
     i, j, k, constant = _bracket(task)
+    if amplitude not in ("auto", "tied", "free"):
+        raise SteeringInputError(f'four_phase: amplitude is "auto", "tied" or "free", got {amplitude!r}')
     gd = _desired(task, (i, j, k), form)
+    loop = math.pi * constant * gd[i] * gd[j]
+    fast = q is None and abs(gd[k]) > _MOST_PERIODS * abs(loop) > _MOST_PERIODS * _NEGLIGIBLE
+    if amplitude == "free" or (amplitude == "auto" and fast):
+        return _free(task, (i, j, k), constant, gd, form, 1 if q is None else q, started)
     q = _periods(task, q, gd[k], constant * gd[i] * gd[j])
     psi = math.atan(gd[k] / (math.pi * q * constant * gd[i] * gd[j])) if gd[k] else 0.0
     period = task.duration / (q + 1)
@@ -67,6 +78,30 @@ def four_phase(task: Task, *, q: int | None = None, form: str = "product") -> Pl
         "constant": constant,
     }
     seconds = {"plan": time.perf_counter() - started}
+    return finish(task, "four_phase", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
+
+
+def _free(task: Task, axes: tuple[int, int, int], constant: float, gd: Any, form: str, q: int, started: float) -> Plan:
+    """A line, q circles of the amplitude that is needed, a line back."""
+    i, j, k = axes
+    q = _periods(task, q, 0.0, 1.0)
+    # as coordinates of the second kind: exp(x_i A_i + x_j A_j + x_k A_k) has its product's k-th one less by c x_i x_j / 2
+    last = gd[k] - (constant * gd[i] * gd[j] / 2 if form == "single" else 0.0)
+    goal = (float(gd[i]), float(gd[j]))
+    a, side = free_amplitude(goal, float(last / constant + gd[i] * gd[j] / 2), q)
+    law = LineAndCircles(task.group.dim, (i, j), goal, a, side, q, task.duration)
+    details = {
+        "form": form,
+        "amplitude": a,
+        "side": side,
+        "gd": tuple(float(value) for value in gd),
+        "q": q,
+        "switches": law.switches,
+        "constant": constant,
+        "winner": "four phases with free amplitude",
+    }
+    seconds = {"plan": time.perf_counter() - started}
+    u = Controls(law, [t for t in law.switches if 0 < t < task.duration])
     return finish(task, "four_phase", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
 
 
@@ -156,7 +191,7 @@ def _periods(task: Task, q: int | None, wanted: float, loop: float) -> int:
     if abs(loop) <= _NEGLIGIBLE:
         raise SteeringInputError(
             f"four_phase: the target's coordinates along {labels[0]} and {labels[1]} must both be non-zero (their product "
-            f"is {loop:.3g}): the loop's area is proportional to it; use method='optimal', or go through a "
+            f"is {loop:.3g}): the loop's area is proportional to it; use amplitude='free', method='optimal', or go through a "
             "via point with both non-zero"
         )
     if q is None:

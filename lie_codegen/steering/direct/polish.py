@@ -115,7 +115,8 @@ def polished(
         now = as_inputs(task, found, True).integral_of_squares(task.weights)
         if not residual <= 1e-8:
             raise PolishError
-        if abs(last - now) <= _STILL * now or 2 * pieces > _MOST_NODES:
+        # what is left above the continuum is about a seventh of the last gain
+        if abs(last - now) <= 7 * _STILL * now or 2 * pieces > _MOST_NODES:
             return found, programme, pieces
         last, u = now, found
         own = task.own(found)
