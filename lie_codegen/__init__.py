@@ -47,6 +47,7 @@ _FRONT_DOOR = {
     "Coset": "lie_codegen.steering.goals",
     "UpToPhase": "lie_codegen.steering.goals",
     "ocp": "lie_codegen.steering.ocp.front",
+    "mpc": "lie_codegen.steering.ocp.mpc",
     "Cone": "lie_codegen.steering.constraints",
     "Ball": "lie_codegen.steering.constraints",
     "plot_plan": "lie_codegen.pictures.plot_plan",

@@ -954,6 +954,33 @@ void OCP_(first_guess)(workspace *w, const real *p, real t0)
 }
 #endif
 
+#if OCP_PLANS
+/* The model's own motion by h in `parts` steps, and its running cost: for simulations around a loop. */
+void OCP_(advance)(const real *x, const real *u, const real *p, real t, real h, int parts, real *next)
+{
+    real from[NS];
+    int i;
+    copy(next, x, NS);
+    for (i = 0; i < parts; ++i) {
+        copy(from, next, NS);
+        step(from, u, p, t + (real)i * h / (real)parts, h / (real)parts, next);
+    }
+}
+
+real OCP_(running_cost)(const real *x, const real *u, const real *p, real t) { return cost_at(x, u, p, t); }
+
+real OCP_(plan_cost)(workspace *w, const real *p, ptrdiff_t stride, real t0)
+{
+    task s;
+    s.w = w;
+    s.p = p;
+    s.stride = stride;
+    s.t0 = t0;
+    s.exact = 0;
+    return plain_cost(&s);
+}
+#endif
+
 /* Moves plan and multipliers one interval on; the last control is repeated and the last state rolled out. */
 static void shift_plan(const task *s)
 {

@@ -312,6 +312,17 @@ class InterpretedMachine(Machine):
             u = u + found[0]
         w["u"] = u
 
+    def advance(self, x: Array, u: Array, p: Array, t: float, h: float, parts: int) -> Array:
+        for i in range(parts):
+            x = self.model.step(x, u, p, t + i * h / parts, h / parts)
+        return x
+
+    def running_cost(self, x: Array, u: Array, p: Array, t: float) -> float:
+        return self.model.cost(x, u, p, t)
+
+    def plan_cost(self, space: Array, rows: Array, t0: float) -> float:
+        return self._merit(Run(space[0], rows, t0), plain=True)
+
     def step(self, space: Array, X: Array, z: Array, rows: Array, t0: float, iterations: int, u: Array) -> int:
         with np.errstate(all="ignore"):
             status = self._step(Run(space[0], rows, t0), self.model.packed(X, z), iterations)

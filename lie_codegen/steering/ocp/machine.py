@@ -8,6 +8,7 @@ import threading
 from collections import OrderedDict
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.runtime.backend import load_library
@@ -32,6 +33,9 @@ class CompiledMachine(Machine):
         )
         self._gains = _function(library, f"{name}_gains", real, void, void, stride, real)
         self._first_guess = _function(library, f"{name}_first_guess", None, void, void, real)
+        self._advance = _function(library, f"{name}_advance", None, void, void, void, real, real, integer, void)
+        self._running_cost = _function(library, f"{name}_running_cost", real, void, void, void, real)
+        self._plan_cost = _function(library, f"{name}_plan_cost", real, void, void, stride, real)
         self.raw_step = _function(library, f"{name}_step", integer, void, void, void, void, stride, real, integer, void)
 
     def solve(
@@ -44,6 +48,17 @@ class CompiledMachine(Machine):
 
     def first_guess(self, space: Array, rows: Array, t0: float) -> None:
         self._first_guess(space.ctypes.data, rows.ctypes.data, t0)
+
+    def advance(self, x: Array, u: Array, p: Array, t: float, h: float, parts: int) -> Array:
+        following = np.empty(len(x))
+        self._advance(x.ctypes.data, u.ctypes.data, p.ctypes.data, t, h, parts, following.ctypes.data)
+        return following
+
+    def running_cost(self, x: Array, u: Array, p: Array, t: float) -> float:
+        return float(self._running_cost(x.ctypes.data, u.ctypes.data, p.ctypes.data, t))
+
+    def plan_cost(self, space: Array, rows: Array, t0: float) -> float:
+        return float(self._plan_cost(space.ctypes.data, rows.ctypes.data, stride_of(rows), t0))
 
     def step(self, space: Array, X: Array, z: Array, rows: Array, t0: float, iterations: int, u: Array) -> int:
         return int(
@@ -84,6 +99,13 @@ def machine_of(data: ProblemData, *, second_order: bool) -> Machine:
             while len(_BUILT) > _MOST:
                 _BUILT.popitem(last=False)
         return _BUILT[key][1]
+
+
+def loop_machine(data: ProblemData) -> Machine:
+    """A solver for a loop: the one that plans, if it is there already, else one without second order, which builds faster."""
+    planned = _BUILT.get((id(data), True))
+    second_order = planned is not None and planned[0] is data
+    return machine_of(data, second_order=second_order)
 
 
 def build_machine(data: ProblemData, *, second_order: bool) -> Machine:

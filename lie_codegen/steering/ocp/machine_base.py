@@ -53,6 +53,18 @@ class Machine:
         """Controls that cost least at the first state."""
         raise NotImplementedError
 
+    def advance(self, x: Array, u: Array, p: Array, t: float, h: float, parts: int) -> Array:
+        """The model's motion by h in `parts` steps, states as stored."""
+        raise NotImplementedError
+
+    def running_cost(self, x: Array, u: Array, p: Array, t: float) -> float:
+        """l."""
+        raise NotImplementedError
+
+    def plan_cost(self, space: Array, rows: Array, t0: float) -> float:
+        """The cost of the plan in a workspace."""
+        raise NotImplementedError
+
     def step(self, space: Array, X: Array, z: Array, rows: Array, t0: float, iterations: int, u: Array) -> int:
         """One sample."""
         raise NotImplementedError

@@ -1,0 +1,253 @@
+"""lc.mpc: the solver of a problem as a controller, one Gauss-Newton sweep a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.steering.ocp.loop import LoopRun, run_loop
+from lie_codegen.steering.ocp.machine import CompiledMachine, loop_machine
+from lie_codegen.steering.ocp.machine_base import HELD, INPUT, OK
+from lie_codegen.steering.ocp.plan import OptimalPlan
+from lie_codegen.steering.ocp.problem import OptimalControlProblem, pack_element
+
+if TYPE_CHECKING:
+    from lie_codegen.steering.ocp.machine_base import Machine
+
+Array = NDArray[Any]
+
+_STATUS = {OK: "ok", HELD: "held", INPUT: "input"}
+
+
+def mpc(problem: OptimalControlProblem, *, iterations: int = 1, penalty: float = 300.0) -> ModelPredictiveControl:
+    """A controller that solves `problem` anew at every sample, from the solution of the last one.
+
+    Each step moves controls, states and multipliers on by one interval, sets the first state to the measurement, and takes
+    `iterations` Gauss-Newton sweeps, each with one roll-out and at most four trials of its line search; the multipliers
+    follow with a constant penalty. A control outside its bounds never leaves it.
+
+    Args:
+        problem: from `lc.ocp`; a sample is one of its intervals.
+        iterations: sweeps a sample; one is enough where samples are short (real-time iteration).
+        penalty: rho of the conditions.
+
+    Raises:
+        InputError: iterations below 1, a penalty that is not positive, or no problem.
+    """
+    if not isinstance(problem, OptimalControlProblem):
+        raise InputError(f"mpc: expected a problem of lc.ocp, got {problem!r:.60}")
+    if isinstance(iterations, bool) or not isinstance(iterations, int | np.integer) or not 1 <= iterations <= 1000:
+        raise InputError(
+            f"mpc({problem.data.name}): iterations must be a whole number from 1 to 1000, got {iterations!r}"
+        )
+    if not (isinstance(penalty, int | float | np.number) and 0 < penalty < np.inf):
+        raise InputError(f"mpc({problem.data.name}): penalty must be a positive number, got {penalty!r}")
+    return ModelPredictiveControl(problem, int(iterations), float(penalty))
+
+
+class ModelPredictiveControl:
+    """The controller. One object is one loop: give each thread its own.
+
+    Attributes:
+        problem, iterations, penalty: what it was made of.
+        status: of the last step: "ok"; "held" (no trial did better: the plan's own control, fed back); "input" (a number
+            that is none was given: the plan's own control); "reset" before the first step.
+    """
+
+    def __init__(self, problem: OptimalControlProblem, iterations: int, penalty: float) -> None:
+        data = problem.data
+        self.problem = problem
+        self.iterations = iterations
+        self.penalty = penalty
+        self.status = "not reset"
+        self._machine: Machine = loop_machine(data)
+        self._space = self._machine.workspace()
+        kind = complex if data.group.is_complex else float
+        self._X = np.zeros((data.group.degree, data.group.degree), kind)
+        self._z = np.zeros(max(1, data.states.size))
+        self._u = np.zeros(data.inputs.size)
+        self._records = np.zeros(data.intervals + 1, _row_type(data.parameters.shapes))
+        self._rows = self._records.view(float).reshape(data.intervals + 1, -1)
+        self._good = self._rows.copy()
+        self._states = {
+            name: (self._z[place].reshape(shape), shape) for name, (place, shape) in data.states.slices().items()
+        }
+        self._parameters = {name: (self._records[name], shape[:2]) for name, shape in data.parameters.shapes}
+        self._h = data.duration / data.intervals
+        self._t = 0.0
+        self._call = self._bound_call()
+
+    def __repr__(self) -> str:
+        return f"<mpc of {self.problem.data.name}: {self.iterations} iteration(s) a sample, status {self.status}>"
+
+    def reset(self, plan: OptimalPlan | None = None, X0: ArrayLike | None = None, **values: Any) -> OptimalPlan:
+        """Starts from a plan of this problem, or from one solved here from X0, states and parameters.
+
+        Raises:
+            InputError, ShapeError, NotFiniteError, NotOnGroupError: as `solve`; a plan of another problem.
+        """
+        if plan is None:
+            plan = self.problem.solve(X0, **values)
+        elif not isinstance(plan, OptimalPlan) or plan.problem != self.problem.data:
+            raise InputError(f"mpc({self.problem.data.name}).reset: expected a plan of this problem, got {plan!r:.60}")
+        elif X0 is not None or values:
+            raise InputError(f"mpc({self.problem.data.name}).reset: give a plan, or X0 with states and parameters")
+        space = self._space[0]
+        space["x"] = [
+            np.concatenate([pack_element(self.problem.data, X), z]) for X, z in zip(plan.X, plan.z, strict=True)
+        ]
+        space["u"], space["K"] = plan.u, plan.gain
+        space["lambda"], space["lambda_end"] = plan.multipliers, plan.end_multipliers
+        space["rho"], space["fresh"], space["curvature"] = self.penalty, 1, 0
+        space["violation"], space["worst"] = plan.violation, -1
+        if plan.parameters.shape[1]:
+            self._rows[...] = plan.parameters
+        self._good[...] = self._rows
+        self._t = 0.0
+        self.status = "reset"
+        return plan
+
+    def step(self, X: Any = None, *, t: float | None = None, **values: Any) -> Array:
+        """(m,) the control for the measured state.
+
+        Args:
+            X: (d, d) measured element; the identity if not given. Numbers that are none are met with the plan's own
+                control and status "input".
+            t: time of the sample; one interval after the last if not given.
+            **values: every state by name, and the parameters that changed, constant or with a row a stage.
+
+        Raises:
+            InputError: before `reset`, a state that is missing, or an unknown name.
+            ShapeError: naming the culprit.
+        """
+        if self.status == "not reset":
+            raise InputError(f"mpc({self.problem.data.name}).step: reset it with a plan first")
+        given, changed = 0, False
+        try:
+            self._X[...] = np.eye(len(self._X)) if X is None else X
+        except (TypeError, ValueError):
+            raise ShapeError(f"{self._where()}: X has shape {np.shape(X)}; it is {self._X.shape}") from None
+        for name, value in values.items():
+            if name in self._states:
+                place, shape = self._states[name]
+                given += 1
+            elif name in self._parameters:
+                place, shape = self._parameters[name]
+                changed = True
+            else:
+                known = ", ".join([*self._states, *self._parameters])
+                raise InputError(f"{self._where()}: no state or parameter {name!r}; there are {known or 'none'}")
+            self._assign(name, place, shape, value)
+        if given < len(self._states):
+            missing = [name for name in self._states if name not in values]
+            raise InputError(f"{self._where()}: no value for the state {', '.join(missing)}")
+        if t is not None:
+            self._t = float(t)
+        status = self._call(self._t)
+        self._t += self._h
+        self.status = _STATUS[status]
+        if changed:
+            # what was no number is not kept for the next sample
+            if status == INPUT:
+                self._rows[...] = self._good
+            else:
+                self._good[...] = self._rows
+        return self._u.copy()
+
+    @property
+    def violation(self) -> float:
+        """Of the worst condition along the plan."""
+        return float(self._space["violation"][0])
+
+    def parameters_now(self) -> Array:
+        """(numbers,) the parameters of the first stage, as last told."""
+        return np.array(self._rows[0, : self.problem.data.parameters.size])
+
+    @property
+    def plan(self) -> OptimalPlan:
+        """The plan as it stands, from the last measurement on; its gains are those of the last sweep (Gauss-Newton)."""
+        space = self._space.copy()
+        rows = self._rows if self.problem.data.parameters.size else np.zeros((1, 0))
+        started = self._t - self._h
+        space["cost"] = self._machine.plan_cost(space, rows, started)
+        admissible = self.violation <= 1e-8
+        space["status"] = 1 if admissible else 2
+        tried = np.array([[space["cost"][0], space["violation"][0]]])
+        return self.problem.plan(self._machine, space, rows.copy(), tried, 0.0)
+
+    def simulate(
+        self,
+        X0: ArrayLike | None = None,
+        *,
+        steps: int,
+        values: Mapping[str, Any] | None = None,
+        plant: Any = None,
+        plant_values: Mapping[str, Any] | None = None,
+        noise: float | Mapping[str, float] | Callable[..., Any] = 0.0,
+        delay: int = 0,
+        compensate: bool = True,
+        substeps: int = 4,
+        seed: int = 0,
+    ) -> LoopRun:
+        """The closed loop; see `lie_codegen.steering.ocp.loop.run_loop`."""
+        return run_loop(
+            self, X0, steps=steps, values=values or {}, plant=plant, plant_values=plant_values or {}, noise=noise,
+            delay=delay, compensate=compensate, substeps=substeps, seed=seed,
+        )  # fmt: skip
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy in another process is made anew, and put where this one stands."""
+        return {
+            "problem": self.problem,
+            "settings": (self.iterations, self.penalty),
+            "space": self._space.copy(),
+            "rows": self._rows.copy(),
+            "t": self._t,
+            "status": self.status,
+        }
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__init__(state["problem"], *state["settings"])  # type: ignore[misc]
+        self._space[...], self._rows[...], self._good[...] = state["space"], state["rows"], state["rows"]
+        self._t, self.status = state["t"], state["status"]
+
+    def _assign(self, name: str, place: Array, shape: tuple[int, ...], value: ArrayLike) -> None:
+        array = np.asarray(value)
+        if array.shape == shape or (array.shape == () and shape == (1,)):
+            place[...] = array
+            return
+        N = len(self._rows) - 1
+        if name in self._parameters and array.shape[1:] == shape and len(array) in (N, N + 1):
+            place[: len(array)] = array
+            place[len(array) :] = array[-1]
+            return
+        raise ShapeError(f"{self._where()}: {name} has shape {array.shape}; it is {shape}")
+
+    def _where(self) -> str:
+        return f"mpc({self.problem.data.name}).step"
+
+    def _bound_call(self) -> Callable[[float], int]:
+        """The step with every address at hand; asking numpy for them costs more than the call."""
+        machine, stride = self._machine, self._rows.shape[1]
+        if not isinstance(machine, CompiledMachine):
+            z = self._z[: self.problem.data.states.size]
+            return lambda t: machine.step(self._space, self._X, z, self._rows, t, self.iterations, self._u)
+        pointers = [each.ctypes.data for each in (self._space, self._X, self._z, self._rows)]
+        u, iterations, raw = self._u.ctypes.data, self.iterations, machine.raw_step
+        return lambda t: int(raw(*pointers, stride, t, iterations, u))
+
+
+def _row_type(shapes: tuple[tuple[str, tuple[int, ...]], ...]) -> np.dtype[Any]:
+    """One stage's parameters as a record, so that each name has a view."""
+    if not shapes:
+        return np.dtype([("none", float)])
+    fields: list[Any] = [
+        (name, complex, shape[:2]) if len(shape) == 3 else (name, float, shape if prod(shape) else ())
+        for name, shape in shapes
+    ]
+    return np.dtype(fields)
