@@ -1043,7 +1043,7 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
         }
         /* the quadratic model's merit from the measured state; a roll-out that does about as well needs no comparison */
         model_difference(w->x[0], measured, d);
-        reference = value;
+        reference = value + OCP_EPSILON * 256 * (1 + (value > 0 ? value : -value));
         for (i = 0; i < NX; ++i) {
             reference += d[i] * (v[i] + dot(P + i * NX, d, NX) / 2);
         }
@@ -1052,10 +1052,11 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
             first[i] = held > lower_bound[i] ? (held < upper_bound[i] ? held : upper_bound[i]) : lower_bound[i];
         }
         trial = forward(&s, 1);
-        accepted = trial <= reference;
+        accepted = is_finite(trial) && trial <= reference;
         if (!accepted) {
             const real full = trial;
             reference = forward(&s, 0);
+            reference += OCP_EPSILON * 256 * (1 + (reference > 0 ? reference : -reference));
             if (is_finite(reference) && !(full <= reference)) {
                 for (alpha = (real)0.5, tried = 1; tried < 4 && !accepted; ++tried, alpha /= 2) {
                     trial = forward(&s, alpha);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,6 +53,7 @@ class ClosedLoop:
     error_estimate: float
 
 
+@overload
 def closed_loop(
     group: MatrixGroup,
     *,
@@ -65,7 +66,28 @@ def closed_loop(
     t: ArrayLike,
     step: float | None = None,
     tolerance: float = 1e-10,
-) -> ClosedLoop:
+) -> ClosedLoop: ...
+
+
+@overload
+def closed_loop(*, mpc: Any, X0: ArrayLike | None = None, t: ArrayLike, **loop: Any) -> Any: ...
+
+
+def closed_loop(
+    group: MatrixGroup | None = None,
+    *,
+    inertia: Any = None,
+    law: Kernel | None = None,
+    reference: Reference | None = None,
+    external: ForceBody | None = None,
+    X0: ArrayLike | None = None,
+    xi0: ArrayLike | None = None,
+    t: ArrayLike,
+    step: float | None = None,
+    tolerance: float = 1e-10,
+    mpc: Any = None,
+    **loop: Any,
+) -> Any:
     """Simulates the second-order system, compiled; the law itself is the one that `generate` writes for flight.
 
     Args:
@@ -80,6 +102,9 @@ def closed_loop(
         t: (k,) equally spaced times.
         step: integration step [s]; None halves it until two runs agree to the tolerance.
         tolerance: on the entries of X and xi at the times t, for step None.
+        mpc: a controller of `lc.mpc`, instead of group, inertia and law: its loop from t[0] to t[-1], a sample an interval;
+            returns its LoopRun, or a tuple of them.
+        **loop: with `mpc` alone: values, plant, plant_values, noise, delay, compensate, substeps, seed, runs.
 
     Raises:
         InputError: an inertia that is not positive definite, a reference that jumps, a law without its reference.
@@ -87,6 +112,14 @@ def closed_loop(
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
     times = _times(t)
+    if mpc is not None:
+        # the controller brings its own loop: it lives on a floor above this one
+        return mpc.simulate(X0, duration=float(times[-1] - times[0]), **loop)
+    if loop or group is None:
+        said = f"no option {', '.join(loop)}" if loop else "no group"
+        raise InputError(
+            f"closed_loop: {said}; without mpc= it takes a group, inertia, law, reference, external, X0, xi0, t"
+        )
     if reference is not None and reference.group != group:
         raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")
     check_loop(law, reference)

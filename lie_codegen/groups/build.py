@@ -60,10 +60,10 @@ def generate(
     steering: Sequence[str | int] | Literal[True] | None = None,
     real: str = "double",
 ) -> Path:
-    """The C package of a group or of kernels, written as a folder; returns its path.
+    """The C package of a group, of kernels or of a controller of `lc.mpc`, written as a folder; returns its path.
 
     Args:
-        what: as `build`.
+        what: as `build`; or a controller, whose package is the bounded solver with its model.
         folder: created if need be.
         steering: controls of a group, for a minimum-energy steering solver in the subfolder "steering", a C package by
             itself with its own example and test vectors; True for all components. The solver is in double.
@@ -76,7 +76,14 @@ def generate(
     """
     from lie_codegen.codegen.generate import generate as generate_package
     from lie_codegen.codegen.views import PackageMetadata
+    from lie_codegen.codegen.write import write_package
 
+    render = getattr(what, "render_package", None)
+    if callable(render):
+        # a controller of a floor above this one says itself what it is as C
+        if steering is not None:
+            raise InputError("generate: steering needs a group, not a controller")
+        return write_package(render(real=real), folder)
     if isinstance(what, str | Path):
         from lie_codegen.groups.catalogue_load import group as load
 

@@ -356,7 +356,8 @@ class InterpretedMachine(Machine):
                 status = HELD if attempt == 0 else status
                 break
             d = self.model.difference(w["x"][0], measured)
-            if not self._improve(run, swept[1] + float(d @ (swept[3] + swept[2] @ d / 2))):
+            expected = swept[1] + 256 * _EPSILON * (1 + abs(swept[1])) + float(d @ (swept[3] + swept[2] @ d / 2))
+            if not self._improve(run, expected):
                 status = HELD if attempt == 0 else status
                 held = self._forward(run, 0.0)
                 if np.isfinite(held):
@@ -374,9 +375,10 @@ class InterpretedMachine(Machine):
     def _improve(self, run: Run, reference: float) -> bool:
         """Whether a roll-out does as well as the plan fed back; it is then in x_new, u_new."""
         full = self._forward(run, 1.0)
-        if full <= reference:
+        if np.isfinite(full) and full <= reference:
             return True
         held = self._forward(run, 0.0)
+        held += 256 * _EPSILON * (1 + abs(held))
         if not np.isfinite(held) or full <= held:
             return bool(np.isfinite(full)) and bool(np.isfinite(self._forward(run, 1.0)))
         return any(self._forward(run, 0.5**halvings) <= held for halvings in (1, 2, 3))

@@ -60,7 +60,7 @@ class Layout:
         """The named arrays in vectors (..., size)."""
         parts = {}
         for name, (place, shape) in self.slices().items():
-            part = vector[..., place].reshape(*vector.shape[:-1], *shape)
+            part = vector[..., place].reshape((*vector.shape[:-1], *shape))
             parts[name] = part[..., 0] + 1j * part[..., 1] if len(shape) == 3 else part
         return parts
 

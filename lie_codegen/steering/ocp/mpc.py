@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from math import prod
 from typing import TYPE_CHECKING, Any
@@ -65,6 +66,7 @@ class ModelPredictiveControl:
         self.iterations = iterations
         self.penalty = penalty
         self.status = "not reset"
+        self._started: OptimalPlan | None = None
         self._machine: Machine = loop_machine(data)
         self._space = self._machine.workspace()
         kind = complex if data.group.is_complex else float
@@ -109,6 +111,7 @@ class ModelPredictiveControl:
             self._rows[...] = plan.parameters
         self._good[...] = self._rows
         self._t = 0.0
+        self._started = plan
         self.status = "reset"
         return plan
 
@@ -184,21 +187,52 @@ class ModelPredictiveControl:
         self,
         X0: ArrayLike | None = None,
         *,
-        steps: int,
+        steps: int | None = None,
+        duration: float | None = None,
         values: Mapping[str, Any] | None = None,
         plant: Any = None,
         plant_values: Mapping[str, Any] | None = None,
-        noise: float | Mapping[str, float] | Callable[..., Any] = 0.0,
+        noise: Any = 0.0,
         delay: int = 0,
         compensate: bool = True,
         substeps: int = 4,
         seed: int = 0,
-    ) -> LoopRun:
-        """The closed loop; see `lie_codegen.steering.ocp.loop.run_loop`."""
-        return run_loop(
-            self, X0, steps=steps, values=values or {}, plant=plant, plant_values=plant_values or {}, noise=noise,
-            delay=delay, compensate=compensate, substeps=substeps, seed=seed,
-        )  # fmt: skip
+        runs: int | None = None,
+    ) -> Any:
+        """The closed loop for a number of steps, or for a duration: a LoopRun; with `runs` a tuple of them, of seeds in turn.
+
+        Each run starts from the plan that this controller holds, which is left as it is. See
+        `lie_codegen.steering.ocp.loop.run_loop` for the rest.
+
+        Raises:
+            InputError, ShapeError, NotFiniteError, NotOnGroupError: naming the culprit.
+        """
+        if (steps is None) == (duration is None):
+            raise InputError(f"closed loop of {self.problem.data.name}: give steps or a duration")
+        count = steps if steps is not None else max(1, round(float(duration or 0.0) / self._h))
+
+        def run(number: int) -> LoopRun:
+            return run_loop(
+                copy.copy(self), X0, steps=count, values=values or {}, plant=plant, plant_values=plant_values or {},
+                noise=noise, delay=delay, compensate=compensate, substeps=substeps, seed=number,
+            )  # fmt: skip
+
+        return run(seed) if runs is None else tuple(run(seed + i) for i in range(runs))
+
+    def render_package(self, real: str = "double") -> dict[str, str]:
+        """The C package that `lc.generate(mpc, folder)` writes: {path: text}; its example starts from the plan of `reset`.
+
+        Raises:
+            InputError: before `reset`.
+            CodegenError: no such real type, or a constant beyond float's range.
+        """
+        from lie_codegen.steering.ocp.package import render_mpc_package
+
+        if self._started is None:
+            raise InputError(
+                f"generate: reset the mpc of {self.problem.data.name} with a plan first: its example needs one"
+            )
+        return render_mpc_package(self._started, iterations=self.iterations, penalty=self.penalty, real=real)
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy in another process is made anew, and put where this one stands."""
@@ -209,12 +243,13 @@ class ModelPredictiveControl:
             "rows": self._rows.copy(),
             "t": self._t,
             "status": self.status,
+            "started": self._started,
         }
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         self.__init__(state["problem"], *state["settings"])  # type: ignore[misc]
         self._space[...], self._rows[...], self._good[...] = state["space"], state["rows"], state["rows"]
-        self._t, self.status = state["t"], state["status"]
+        self._t, self.status, self._started = state["t"], state["status"], state["started"]
 
     def _assign(self, name: str, place: Array, shape: tuple[int, ...], value: ArrayLike) -> None:
         array = np.asarray(value)

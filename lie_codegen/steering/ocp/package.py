@@ -1,0 +1,126 @@
+"""A controller as a C package: {path: text}, the same bytes for the same controller and plan."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from lie_codegen.codegen.opcodes import REALS
+from lie_codegen.codegen.templates import render
+from lie_codegen.codegen.write import GENERATOR
+from lie_codegen.errors import CodegenError
+from lie_codegen.steering.ocp.budget import Budget, budget_of
+from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
+from lie_codegen.steering.ocp.plan import OptimalPlan
+from lie_codegen.steering.ocp.problem import pack_element, unpack_elements
+from lie_codegen.steering.ocp.source import CORE, SolverView, render_solver, solver_view
+
+Array = NDArray[Any]
+
+_SAMPLES = 6
+_NOISE = 0.005
+#: What the example allows, relative to max(1, |control|): one sweep multiplies the rounding of a stage along the horizon.
+_TOLERANCES = {"double": 1e-8, "float": 5e-3}
+
+
+@dataclass(frozen=True)
+class SampleVector:
+    """One sample: the measured state, and the control."""
+
+    X: tuple[float, ...]
+    z: tuple[float, ...]
+    u: tuple[float, ...]
+
+
+def render_mpc_package(plan: OptimalPlan, *, iterations: int, penalty: float, real: str = "double") -> dict[str, str]:
+    """The package of a loop that starts from `plan`.
+
+    Raises:
+        CodegenError: no such real type, or a constant beyond float's range.
+    """
+    if real not in REALS:
+        raise CodegenError(f"real is one of {', '.join(REALS)}, given {real!r}")
+    data = plan.problem
+    view, model = solver_view(data, second_order=False, real=real)
+    vectors = make_vectors(plan, InterpretedMachine(data, model), iterations, penalty)
+    sources = render_solver(view)
+    budget = budget_of(view, iterations)
+    literal = REALS[real].literal
+    shown = [{key: [literal(x) for x in values] for key, values in asdict(vector).items()} for vector in vectors]
+    context = {
+        "view": view,
+        "vectors": shown,
+        "rows": [[literal(x) for x in row] for row in plan.parameters],
+        "first": [literal(x) for x in np.concatenate([pack_element(data, plan.X[0]), plan.z[0]])],
+        "controls": [[literal(x) for x in row] for row in np.asarray(plan.u)],
+        "multipliers": [[literal(x) for x in row] for row in plan.multipliers],
+        "end_multipliers": [literal(x) for x in plan.end_multipliers],
+        "penalty": literal(penalty),
+        "iterations": iterations,
+        "tolerance": repr(_TOLERANCES[real]),
+        "zero": literal(0.0),
+        "budget": budget,
+    }
+    tree = {
+        f"include/{view.prefix}.h": sources[f"{view.prefix}.h"],
+        f"src/{view.prefix}.c": sources[f"{view.prefix}.c"],
+        f"src/{CORE}": sources[CORE],
+        "CMakeLists.txt": render("ocp_CMakeLists.txt.jinja", **context),
+        "example.c": render("ocp_example.c.jinja", **context),
+        "test_vectors.csv": render("ocp_vectors.csv.jinja", vectors=[asdict(vector) for vector in vectors]),
+        "README.md": render("ocp_README.md.jinja", **context),
+    }
+    return {**tree, "manifest.json": _manifest(view, budget, tree)}
+
+
+def make_vectors(
+    plan: OptimalPlan, machine: InterpretedMachine, iterations: int, penalty: float
+) -> tuple[SampleVector, ...]:
+    """Samples along the plan with a little noise, seeded, and the controls by the numpy solver."""
+    data, rng = plan.problem, np.random.default_rng(0)
+    space = machine.workspace()
+    rows, h = np.ascontiguousarray(plan.parameters), data.duration / data.intervals
+    space["x"][0, 0] = np.concatenate([pack_element(data, plan.X[0]), plan.z[0]])
+    space["u"][0], space["rho"], space["fresh"] = plan.u, penalty, 1
+    space["lambda"][0], space["lambda_end"][0] = plan.multipliers, plan.end_multipliers
+    run = Run(space[0], rows, 0.0)
+    for k in range(data.intervals):
+        last = (space["x"][0, k], space["u"][0, k], run.row(k), k * h)
+        space["x"][0, k + 1] = machine.model.step(*last, h)
+    x, vectors = np.array(space["x"][0, 0]), []
+    for k in range(min(_SAMPLES, data.intervals)):
+        X, z = unpack_elements(data, x[None])
+        element = X[0] @ expm(data.group.hat(_NOISE * rng.normal(size=data.group.dim)))
+        states = z[0] + _NOISE * rng.normal(size=len(z[0]))
+        u = np.zeros(data.inputs.size)
+        machine.step(space, element, states, rows, k * h, iterations, u)
+        flat = element.astype(complex).ravel().view(float) if data.group.is_complex else element.ravel()
+        vectors.append(SampleVector(tuple(map(float, flat)), tuple(map(float, states)), tuple(map(float, u))))
+        x = machine.advance(x, u, run.row(k), k * h, h, 1)
+    return tuple(vectors)
+
+
+def _manifest(view: SolverView, budget: Budget, tree: Mapping[str, str]) -> str:
+    data: dict[str, Any] = {
+        "generator": GENERATOR,
+        "format": 1,
+        "namespace": view.prefix,
+        "real": view.real,
+        "problem": list(view.summary),
+        "intervals": view.intervals,
+        "workspace_bytes": view.bytes,
+        "stack_bytes": budget.stack,
+        "operations_usual": budget.usual,
+        "operations_worst": budget.worst,
+        "sweeps_worst": budget.sweeps,
+        "rollouts_worst": budget.rollouts,
+        "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
+    }
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
