@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.identifiers import check_identifier
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 #: (), (k,), (r, c); or (d, d, 2) for a complex matrix of a complex group, as (re, im).
 Shape = tuple[int, ...]
 
