@@ -36,6 +36,7 @@ _FRONT_DOOR = {
     "order_check": "lie_codegen.averaging.order_check",
     "Kernel": "lie_codegen.kernel.kernel",
     "Port": "lie_codegen.kernel.kernel",
+    "kernel_factory": "lie_codegen.kernel.definition",
     "group_kernels": "lie_codegen.groups.kernels",
     "nearest": "lie_codegen.groups.maps.nearest",
     "build": "lie_codegen.groups.build",

@@ -19,6 +19,7 @@ from lie_codegen.codegen.views import PackageMetadata, PackageView, package_view
 from lie_codegen.codegen.write import GENERATOR
 from lie_codegen.errors import CodegenError
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernel.definition import described
 from lie_codegen.kernel.kernel import Kernel
 
 #: What example.c allows between its results and the vectors, relative to max(1, |expected|).
@@ -160,6 +161,12 @@ def _csv_rows(kernels: Sequence[Kernel], vectors: Sequence[Sequence[TestVector]]
     ]
 
 
+def _function(kernel: Kernel) -> dict[str, Any]:
+    """The signature, and the definition where a number is compiled in."""
+    own = {"definition": kernel.definition} if described(kernel.definition) else {}
+    return {**Signature.of(kernel).to_json(), **own}
+
+
 def _manifest(view: PackageView, kernels: Sequence[Kernel], tree: Mapping[str, str]) -> str:
     data: dict[str, Any] = {
         "generator": GENERATOR,
@@ -167,7 +174,7 @@ def _manifest(view: PackageView, kernels: Sequence[Kernel], tree: Mapping[str, s
         "namespace": view.namespace,
         "version": view.version,
         **({"real": view.type_name} if view.type_name != "double" else {}),
-        "functions": [Signature.of(kernel).to_json() for kernel in kernels],
+        "functions": [_function(kernel) for kernel in kernels],
         "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
     }
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"

@@ -11,6 +11,7 @@ from lie_codegen.codegen.opcodes import C99, RESERVED, Target
 from lie_codegen.codegen.signature import is_step
 from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Tape
+from lie_codegen.kernel.definition import described
 from lie_codegen.kernel.kernel import Kernel, Port
 
 _WIDTH = 108
@@ -88,6 +89,7 @@ class KernelView:
     symbol: str
     formula: tuple[str, ...]
     source: tuple[str, ...]
+    parameters: tuple[str, ...]
     inputs: tuple[PortView, ...]
     outputs: tuple[PortView, ...]
     unused: tuple[str, ...]
@@ -165,6 +167,7 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: b
         symbol=kernel.symbol,
         formula=comment_lines(kernel.formula),
         source=comment_lines(f"Source: {kernel.source}" if kernel.source else ""),
+        parameters=tuple(line for text in described(kernel.definition) for line in comment_lines(text)),
         inputs=inputs,
         outputs=outputs,
         unused=_unread(inputs, tape) if pieces is None else (),

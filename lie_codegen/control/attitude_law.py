@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_number, real_number
 from lie_codegen.groups.maps.rotation_log import half_angle_ratio, rotation_log
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
@@ -35,14 +37,23 @@ _ATTITUDE = Port("X", (3, 3), description="attitude error: body to reference, R_
 _RATE = Port("omega", (3,), "rad/s", description="body angular velocity")
 
 
+def _units(parameters: Mapping[str, Any]) -> Mapping[str, str]:
+    """Of the gains: the kinds that command a velocity, and the one that commands a torque."""
+    if parameters.get("kind", "pd") != "pd":
+        return {"k_p": "1/s"}
+    return {"inertia": "kg m^2", "k_p": "N m/rad", "k_d": "N m s/rad"}
+
+
+@kernel_factory(units=_units)
 def attitude_law(
-    kind: str,
+    kind: str = "p",
     *,
     inertia: Any = None,
     k_p: Any = 1,
     k_d: Any = None,
     gyroscopic: str = "cancel",
     z: Sequence[Any] = (0, 0, 1),
+    name: str | None = None,
 ) -> Kernel:
     """An attitude law of Geyer's paper.
 
@@ -55,6 +66,7 @@ def attitude_law(
         k_d: [N m s/rad], for "pd".
         gyroscopic: "cancel", "none" or "double", for "pd".
         z: the inertial direction that the sensor of "reduced" sees, of any length.
+        name: C identifier: the symbol is so3_<name>; "attitude_" and the kind if None.
 
     Raises:
         InputError: an unknown kind or gyroscopic term, an indefinite inertia, a gain that is not positive.
@@ -67,13 +79,14 @@ def attitude_law(
     if kind == "pd":
         if inertia is None or k_d is None:
             raise InputError("the attitude law 'pd' needs inertia and k_d")
-        return _proportional_derivative(inertia, k_p, k_d, gyroscopic)
+        return replace(_proportional_derivative(inertia, k_p, k_d, gyroscopic), name=name or "attitude_pd")
     if inertia is not None:
         body_inertia(inertia)
     if k_d is not None:
         positive_number(k_d, "k_d")
     gyroscopic_factor(gyroscopic)
-    return _proportional(k_p) if kind == "p" else _reduced(k_p, z)
+    made = _proportional(k_p) if kind == "p" else _reduced(k_p, z)
+    return replace(made, name=name or made.name)
 
 
 def _proportional(k_p: Any) -> Kernel:
@@ -179,6 +192,7 @@ def _angle_over_sine(ops: Arithmetic, sine_squared: Scalar, cosine: Scalar) -> S
 _ANTIPODE = 1e-14
 
 
+@kernel_factory(units=_units)
 def attitude_lyapunov(
     *, inertia: Any, k_p: Any, k_d: Any, epsilon: Any, gyroscopic: str = "none", name: str = "attitude_lyapunov"
 ) -> Kernel:

@@ -22,6 +22,7 @@ from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.definition import record_factory
 
 Gains = Mapping[str, Any]
 
@@ -46,6 +47,7 @@ def error_names(group: MatrixGroup) -> tuple[str, ...]:
     return tuple(names)
 
 
+@record_factory()
 def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
     """A pair by name.
 

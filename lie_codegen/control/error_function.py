@@ -17,6 +17,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.matrix_formula import matrix_formula, scalar_formula
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
@@ -104,6 +105,7 @@ class ErrorFunction:
     description: str = field(default="", compare=False)
 
 
+@record_factory()
 def error_function(
     group: MatrixGroup,
     phi: Any,

@@ -18,16 +18,18 @@ import sympy as sp
 from lie_codegen.control.error_catalogue import gain
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.tracking_law import as_error, tracking_law
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, matvec, minus, number, plus, scaled
 
 
+@kernel_factory()
 def integral_law(
     group: MatrixGroup,
     *,
@@ -94,7 +96,8 @@ def integral_law(
     )
 
 
-def with_limits(law: Kernel, limits: Any) -> Kernel:
+@kernel_factory()
+def with_limits(law: Kernel, limits: Any, name: str | None = None) -> Kernel:
     """The same law with its first output, a force or velocity, clipped to +-limits component by component.
 
     Raises:
@@ -109,7 +112,7 @@ def with_limits(law: Kernel, limits: Any) -> Kernel:
         first, *others = law.evaluate(ops, *arguments)
         return saturated(ops, first, bounds), *others
 
-    return replace(law, body=body, formula=f"{law.formula}; clipped to +-limits")
+    return replace(law, name=name or law.name, body=body, formula=f"{law.formula}; clipped to +-limits")
 
 
 def force_limits(limits: Any, size: int) -> list[sp.Expr] | None:
@@ -120,9 +123,8 @@ def force_limits(limits: Any, size: int) -> list[sp.Expr] | None:
     """
     if limits is None:
         return None
-    values = limits if isinstance(limits, Sequence) or hasattr(limits, "tolist") else [limits] * size
-    if isinstance(values, str):
-        raise InputError(f"limits {limits!r} are not numbers")
+    many = (isinstance(limits, Sequence) and not isinstance(limits, str)) or hasattr(limits, "tolist")
+    values = limits if many else [limits] * size
     if len(values) != size:
         raise ShapeError(f"{len(values)} limits for {size} components")
     return [positive_number(value, f"limits[{i}]") for i, value in enumerate(values)]

@@ -21,6 +21,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.definition import doubles, record_factory
 
 TIME = sp.Symbol("t", real=True)
 
@@ -70,6 +71,7 @@ class WaypointReference:
 Reference = FormulaReference | WaypointReference
 
 
+@record_factory(start=doubles)
 def formula_reference(group: MatrixGroup, coordinates: Sequence[Any], *, start: Any = None) -> FormulaReference:
     """A reference from formulas of t, one for each coordinate of the second kind.
 

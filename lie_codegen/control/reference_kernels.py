@@ -18,12 +18,14 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData, body_velocity, product_exp
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.definition import doubles, kernel_factory, record_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec
 
 
+@kernel_factory()
 def reference_kernel(reference: Reference, name: str = "reference") -> Kernel:
     """The kernel t -> (X_d, xi_d, xi_d_dot)."""
     group = reference.group
@@ -145,6 +147,7 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
     ]
 
 
+@record_factory(times=doubles, waypoints=doubles, start=doubles)
 def reference(
     group: MatrixGroup,
     formulas: Sequence[Any] | None = None,

@@ -25,6 +25,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, bracket, matmul, plus, scaled
 from lie_codegen.mechanics.kernels import acceleration_body
@@ -49,6 +50,7 @@ def check_loop(law: Kernel | None, reference: Reference | None) -> None:
         raise InputError(f"the law {law.name} tracks: give it a reference")
 
 
+@kernel_factory()
 def second_order_step(
     group: MatrixGroup,
     inertia: Any,
@@ -173,6 +175,7 @@ def _square(group: MatrixGroup, flat: Sequence[Any]) -> list[list[Any]]:
     return [list(flat[d * i : d * (i + 1)]) for i in range(d)]
 
 
+@kernel_factory()
 def held_force_step(group: MatrixGroup, inertia: Any, name: str = "held_force_step") -> Kernel:
     """The step (state, force, h) -> (state_next,) under a constant body force, as a sampled controller gives it.
 

@@ -33,6 +33,7 @@ from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
     Vector,
@@ -51,6 +52,7 @@ from lie_codegen.kernel.linear import (
 FEEDFORWARDS = ("basic", "right", "left", "levi_civita")
 
 
+@kernel_factory()
 def tracking_law(
     group: MatrixGroup,
     *,

@@ -16,6 +16,7 @@ from lie_codegen.groups.maps.logarithm import log_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.kernel.dual import Dual, DualArithmetic, tangent_of
 from lie_codegen.kernel.linear import matvec
 
@@ -23,6 +24,7 @@ from lie_codegen.kernel.linear import matvec
 _ON_GROUP = 1e-8
 
 
+@record_factory(times=doubles, waypoints=doubles)
 def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLike) -> WaypointReference:
     """A twice continuously differentiable curve through the waypoints, at rest at both ends.
 

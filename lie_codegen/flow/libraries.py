@@ -27,7 +27,7 @@ def integrators(group: MatrixGroup) -> Library:
         named = [group_kernel(group, name) for name in ("wei_norman_matrix", "product_exp")]
         return [rkmk4_step(group), wei_norman_step(group), *named]
 
-    return build_kernels(kernels, namespace=group.name, definition=f"integrators\n{group.definition}")
+    return build_kernels(kernels, namespace=group.name, definition=f"integrators\n{group.definition_text}")
 
 
 @lru_cache(maxsize=32)
@@ -58,4 +58,4 @@ def _commutator_free(group: MatrixGroup) -> Library:
 
         return [commutator_free_step(group)]
 
-    return build_kernels(kernels, namespace=group.name, definition=f"commutator_free\n{group.definition}")
+    return build_kernels(kernels, namespace=group.name, definition=f"commutator_free\n{group.definition_text}")

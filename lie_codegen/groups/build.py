@@ -119,7 +119,7 @@ def source_definition(source: bytes) -> str:
 
 def object_definition(group: MatrixGroup) -> str:
     """What `build` knows a group by."""
-    return f"group\n{group.definition}"
+    return f"group\n{group.definition_text}"
 
 
 def _build_named(what: str | Path) -> GroupLibrary:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -13,6 +14,7 @@ from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernel.definition import makes_records
 
 
 def from_matrices(
@@ -71,6 +73,17 @@ def from_brackets(
         raise InputError(f'{name}: brackets must be a mapping such as {{("a", "b"): {{"c": 1}}}}, got {brackets!r}')
     algebra = algebra_from_brackets(name, labels, brackets)
     return MatrixGroup(algebra, faithful_representation(algebra), _units(name, labels, units), description)
+
+
+@makes_records
+def defined_group(name: str, labels: Sequence[str], matrices: Sequence[Any], units: Sequence[str]) -> MatrixGroup:
+    """The group of a `MatrixGroup.definition`, made once a process."""
+    return _made(name, tuple(labels), tuple(matrices), tuple(units))
+
+
+@lru_cache(maxsize=64)
+def _made(name: str, labels: tuple[str, ...], matrices: tuple[Any, ...], units: tuple[str, ...]) -> MatrixGroup:
+    return from_matrices(name, labels, matrices, units=units)
 
 
 def exact_matrix(where: str, rows: Any) -> sp.ImmutableMatrix:

@@ -30,6 +30,7 @@ from lie_codegen.groups.maps.renormalise import renormalised
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman import body as wei_norman_body
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
 from lie_codegen.kernel.linear import bracket, identity, matmul
 
@@ -51,6 +52,7 @@ def group_kernels(group: MatrixGroup) -> tuple[Kernel, ...]:
     return tuple(group_kernel(group, name) for name in KERNEL_NAMES)
 
 
+@kernel_factory()
 def group_kernel(group: MatrixGroup, name: str) -> Kernel:
     """One kernel of a group.
 

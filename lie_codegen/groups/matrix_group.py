@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.algebra.constructions import permutation, reorder_algebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
+from lie_codegen.kernel.definition import Definition, definition_of
 
 Array = NDArray[Any]
 
@@ -127,7 +128,20 @@ class MatrixGroup:
         return MatrixGroup(algebra, basis, tuple(self.units[i] for i in order), self.description)
 
     @cached_property
-    def definition(self) -> str:
+    def definition(self) -> Definition:
+        """Plain data that determines the group: name, labels, exact matrices, units."""
+        rows = {
+            "labels": self.labels,
+            "matrices": [matrix.tolist() for matrix in self.exact_basis],
+            "units": self.units,
+        }
+        return definition_of("lie_codegen.groups.definition:defined_group", {"name": self.name, **rows})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return MatrixGroup, (self.algebra, self.exact_basis, self.units, self.description)
+
+    @cached_property
+    def definition_text(self) -> str:
         """Canonical text of everything the derived code depends on; equal texts give equal code."""
         rows = [f"{label} [{unit}] = {matrix.tolist()}" for label, unit, matrix in self._rows()]
         return "\n".join([self.name, self.description, *rows])

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import random
+import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import prod
 from typing import Any
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.definition import Definition, made_from
 
 #: body(ops, *inputs) -> outputs; vectors are lists, matrices lists of rows, scalars plain scalars.
 Body = Callable[..., tuple[Any, ...]]
@@ -47,9 +49,14 @@ class Port:
         return prod(self.shape) * (2 if self.is_complex else 1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kernel:
     """A function with named, shaped inputs and outputs, written once over an abstract arithmetic.
+
+    Kernels are values. One that a factory made (`kernel_factory`) has a `definition`, from which equality, hash, pickle,
+    the cache key and the generated header follow, and from which it can be made again; its body and its sampler are derived and
+    never compared. One that a user writes down (or changes by `dataclasses.replace`) has none: it equals another if all else
+    is equal and the two bodies are one function, and it can be pickled if its body is a function of a module.
 
     Attributes:
         name: C identifier; the attribute of the compiled library.
@@ -59,16 +66,19 @@ class Kernel:
         formula: the identity it computes, in plain text.
         source: where the formula comes from, with its equation number.
         sampler: admissible inputs for test vectors; uniform in [-1, 1] when None.
+        definition: what it is, as plain data: kind, exact parameters, records; None for one written by hand.
     """
 
     name: str
     namespace: str
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
-    body: Body = field(compare=False)
+    body: Body = field(repr=False)
     formula: str = ""
     source: str = ""
-    sampler: Sampler | None = field(default=None, compare=False)
+    sampler: Sampler | None = field(default=None, repr=False)
+    #: Not an argument: `dataclasses.replace` makes another thing, of which this would no longer be true.
+    definition: Definition | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_identifier(self.name, "kernel name")
@@ -79,6 +89,43 @@ class Kernel:
             raise InputError(f"kernel {self.symbol}: port names repeated: {', '.join(repeated)}; rename one of each")
         if not self.outputs:
             raise InputError(f"kernel {self.symbol} has no output")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Kernel):
+            return NotImplemented
+        if self._record() != other._record() or self.definition != other.definition:
+            return False
+        return self.definition is not None or self.body is other.body
+
+    def __hash__(self) -> int:
+        return hash((self._record(), self.definition))
+
+    def _record(self) -> tuple[Any, ...]:
+        return self.name, self.namespace, self.inputs, self.outputs, self.formula, self.source
+
+    def defined_by(self, definition: Definition) -> Kernel:
+        """The same with its definition, which must determine it."""
+        made = replace(self)
+        object.__setattr__(made, "definition", definition)
+        return made
+
+    def __copy__(self) -> Kernel:
+        return self
+
+    def __deepcopy__(self, _: Any) -> Kernel:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.definition is not None:
+            return made_from, (self.definition,)
+        for function in (self.body, self.sampler):
+            if function is not None and not _is_global(function):
+                raise InputError(
+                    f"the kernel {self.symbol} cannot travel: {getattr(function, '__qualname__', function)} is a function "
+                    "inside another; make the kernel in a factory (@lc.kernel_factory), or write a function of a module"
+                )
+        record = (self.name, self.namespace, self.inputs, self.outputs, self.body, self.formula, self.source)
+        return Kernel, (*record, self.sampler)
 
     @property
     def symbol(self) -> str:
@@ -92,6 +139,12 @@ class Kernel:
     def sample(self, rng: random.Random) -> tuple[Any, ...]:
         """One admissible value for each input."""
         return self.sampler(rng) if self.sampler else tuple(uniform_sample(port, rng) for port in self.inputs)
+
+
+def _is_global(function: Any) -> bool:
+    """Whether a pickle can name it."""
+    module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", "")
+    return getattr(sys.modules.get(module or ""), name, None) is function
 
 
 def uniform_sample(port: Port, rng: random.Random) -> Any:

@@ -52,7 +52,7 @@ def _library(group: MatrixGroup) -> Library:
 
         return [driven_step(group)]
 
-    return build_kernels(kernels, namespace=group.name, definition=f"driven\n{group.definition}")
+    return build_kernels(kernels, namespace=group.name, definition=f"driven\n{group.definition_text}")
 
 
 def simulate_driven(

@@ -16,6 +16,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, ad_star, bracket, matvec, plus, scaled
 
@@ -52,7 +53,8 @@ def driven_increments(
     return theta, change
 
 
-def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE) -> Kernel:
+@kernel_factory()
+def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE, name: str = "driven_step") -> Kernel:
     """(state, inertia, inverse, f0, fm, f1, h) -> (state_next,): fourth order, on the group for |h xi| <= 1/4.
 
     The state is the varying entries of X, then xi; f0, fm, f1 are the body force at t, t + h/2, t + h. Munthe-Kaas,
@@ -61,6 +63,7 @@ def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE) -> Kernel:
     Args:
         group: any matrix group.
         degree: of the Taylor polynomial of the exponential.
+        name: C identifier.
     """
     n, size = group.dim, packed_size(group)
 
@@ -85,7 +88,7 @@ def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE) -> Kernel:
 
     forces = (("f0", "t"), ("fm", "t + h/2"), ("f1", "t + h"))
     return Kernel(
-        name="driven_step",
+        name=name,
         namespace=group.name,
         inputs=(
             Port("state", (size + n,), description="varying entries of X, row by row, then xi"),

@@ -15,6 +15,7 @@ from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, ad_star, constant_matrix, dot, matvec, plus
 
@@ -27,6 +28,7 @@ def acceleration_body(
     return matvec(constant_matrix(ops, inertia.inv()), plus(ad_star(ops, group.algebra, xi, momentum), force))
 
 
+@kernel_factory()
 def euler_poincare_kernel(group: MatrixGroup, inertia: Any, name: str = "acceleration") -> Kernel:
     """(xi, force) -> (xi_dot, energy): I xi' = ad*_xi I xi + f and <I xi, xi>/2.
 
@@ -53,6 +55,7 @@ def euler_poincare_kernel(group: MatrixGroup, inertia: Any, name: str = "acceler
     )
 
 
+@kernel_factory()
 def spatial_momentum_kernel(group: MatrixGroup, inertia: Any, name: str = "spatial_momentum") -> Kernel:
     """(X, xi) -> Ad*_{X^-1} I xi, which a free body keeps.
 

@@ -26,6 +26,7 @@ from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import is_zero, product, solve
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
@@ -49,6 +50,7 @@ _NEWTON = 3
 PotentialForce = Callable[[Arithmetic, Any], Vector]
 
 
+@kernel_factory()
 def variational_step(
     group: MatrixGroup, inertia: Any, force: PotentialForce | None = None, name: str = "variational_step"
 ) -> Kernel:

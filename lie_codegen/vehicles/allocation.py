@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.kernel.definition import doubles, record_factory
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ def thruster_matrix(positions: ArrayLike, directions: ArrayLike) -> NDArray[np.f
     return np.vstack([np.cross(r, d).T, d.T])
 
 
+@record_factory(B=doubles)
 def allocate(B: ArrayLike, *, weights: Sequence[float] | None = None, one_sided: bool = False) -> Allocation:
     """The allocation of least weighted effort.
 

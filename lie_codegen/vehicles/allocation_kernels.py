@@ -6,11 +6,13 @@ from typing import Any
 
 from lie_codegen.control.integral_law import force_limits, saturated
 from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, matvec, minus, plus, scaled
 from lie_codegen.vehicles.allocation import Allocation
 
 
+@kernel_factory()
 def allocation_kernel(
     allocation: Allocation, *, limits: Any = None, namespace: str = "se3", name: str = "allocation"
 ) -> Kernel:

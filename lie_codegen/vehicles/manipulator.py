@@ -16,6 +16,7 @@ import sympy as sp
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.vehicles.riemannian import coriolis
@@ -23,6 +24,7 @@ from lie_codegen.vehicles.riemannian import coriolis
 _KINDS = ("augmented_pd", "computed_torque")
 
 
+@kernel_factory()
 def manipulator_law(
     inertia: Sequence[Sequence[Any]],
     *,

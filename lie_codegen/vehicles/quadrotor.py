@@ -27,6 +27,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import body_inertia, positive_number
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -51,6 +52,7 @@ _GAINS = ("k_x", "k_v", "k_R", "k_W")
 _REFERENCE = ("x_d", "v_d", "a_d", "j_d", "s_d", "b_1d", "b_1d_dot", "b_1d_ddot")
 
 
+@kernel_factory(units={"mass": "kg", "inertia": "kg m^2", "gravity": "m/s^2"})
 def quadrotor_law(
     *, mass: Any, inertia: Any, gains: Mapping[str, Any], gravity: Any = GRAVITY, name: str = "quadrotor_law"
 ) -> Kernel:
@@ -105,6 +107,7 @@ def quadrotor_law(
     )
 
 
+@kernel_factory()
 def flat_reference(position: Sequence[Any], heading: Any = 0, name: str = "flat_reference") -> Kernel:
     """The reference of the law from formulas of t: t -> (x_d, ..., s_d, b_1d, b_1d_dot, b_1d_ddot).
 

@@ -9,10 +9,12 @@ from typing import Any
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, minus, number, plus, scaled
 
 
+@kernel_factory(units={"k_p": "1/s^2", "k_d": "1/s"})
 def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, name: str = "sphere_law") -> Kernel:
     """Tracking for nabla_{q'} q' = F on S^n: (q, q_dot, r, r_dot, r_ddot) -> (force, phi, W, W_dot).
 

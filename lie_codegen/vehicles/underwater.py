@@ -24,6 +24,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import eigenvalues, positive_matrix, real_number, symmetric_matrix
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, ad_star, constant_matrix, cross, dot, matvec, minus, number, plus, scaled
 
@@ -56,6 +57,7 @@ class UnderwaterVehicle:
     current: tuple[sp.Expr, ...]
 
 
+@record_factory()
 def underwater_vehicle(
     group: MatrixGroup,
     *,
@@ -97,6 +99,7 @@ def underwater_forces(vehicle: UnderwaterVehicle) -> ForceBody:
     return force
 
 
+@kernel_factory()
 def underwater_kernel(vehicle: UnderwaterVehicle, name: str = "underwater_forces") -> Kernel:
     """(X, xi) -> force, to be cancelled by a law or added to a simulation."""
     return Kernel(
@@ -113,14 +116,15 @@ def underwater_kernel(vehicle: UnderwaterVehicle, name: str = "underwater_forces
     )
 
 
-def compensated(law: Kernel, vehicle: UnderwaterVehicle) -> Kernel:
+@kernel_factory()
+def compensated(law: Kernel, vehicle: UnderwaterVehicle, name: str | None = None) -> Kernel:
     """A tracking law on SE(3) with the vehicle's forces taken off: force - f(X, xi), so that the loop sees none of them."""
 
     def body(ops: Arithmetic, X: Any, xi: Vector, *reference: Any) -> tuple[Any, ...]:
         force, *others = law.evaluate(ops, X, xi, *reference)
         return minus(force, _forces(ops, vehicle, X, xi)), *others
 
-    return replace(law, body=body, formula=f"{law.formula}; less the forces of the water")
+    return replace(law, name=name or law.name, body=body, formula=f"{law.formula}; less the forces of the water")
 
 
 def _forces(ops: Arithmetic, vehicle: UnderwaterVehicle, X: Any, xi: Sequence[Scalar]) -> Vector:

@@ -7,10 +7,12 @@ from typing import Any
 from lie_codegen.groups.maps.rkmk import flow_step, times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel
 
 
-def commutator_free_step(group: MatrixGroup) -> Kernel:
+@kernel_factory()
+def commutator_free_step(group: MatrixGroup, name: str = "commutator_free_step") -> Kernel:
     """One step of X' = X hat(u): (X, u0, um, u1, h) -> X_next, for `scan` and `scan_batch`.
 
     X_next = X exp(h (u0/4 + um/3 - u1/12)) exp(h (-u0/12 + um/3 + u1/4)); u0, um, u1 are u at t, t + h/2, t + h.
@@ -26,4 +28,4 @@ def commutator_free_step(group: MatrixGroup) -> Kernel:
 
     formula = "X_next = X exp(h (u0/4 + um/3 - u1/12)) exp(h (-u0/12 + um/3 + u1/4))"
     source = "Celledoni, Marthinsen and Owren, Future Gener. Comput. Syst. 19 (2003) 341, for u that depends on t alone"
-    return flow_step(group, "commutator_free_step", body, formula, source)
+    return flow_step(group, name, body, formula, source)

@@ -13,6 +13,7 @@ from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp, rate
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Body, Kernel, Port
 
 #: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
@@ -113,7 +114,8 @@ def sum_products(pairs: Any) -> Any:
     return 0 if total is None else total
 
 
-def rkmk4_step(group: MatrixGroup) -> Kernel:
+@kernel_factory()
+def rkmk4_step(group: MatrixGroup, name: str = "rkmk4_step") -> Kernel:
     """One step of X' = X hat(u): (X, u0, um, u1, h) -> X_next, for `scan`.
 
     u0, um, u1 are u at t, t + h/2, t + h; exact on the group, global error O(h^4); |h u| <= 1/4 keeps the
@@ -124,7 +126,7 @@ def rkmk4_step(group: MatrixGroup) -> Kernel:
         return (times_taylor_exp(group, ops, X, rkmk4_increment(group, ops, u0, um, u1, h)),)
 
     formula = "X_next = X exp(Theta), Theta by one RKMK4 step of Theta' = dexpinv(u)"
-    return flow_step(group, "rkmk4_step", body, formula, "Munthe-Kaas, BIT 38 (1998) 92")
+    return flow_step(group, name, body, formula, "Munthe-Kaas, BIT 38 (1998) 92")
 
 
 def flow_step(group: MatrixGroup, name: str, body: Body, formula: str, source: str) -> Kernel:
@@ -152,7 +154,8 @@ def flow_step(group: MatrixGroup, name: str, body: Body, formula: str, source: s
     )
 
 
-def wei_norman_step(group: MatrixGroup) -> Kernel:
+@kernel_factory()
+def wei_norman_step(group: MatrixGroup, name: str = "wei_norman_step") -> Kernel:
     """One classical RK4 step of g' = M(g) u: (g, u0, um, u1, h) -> g_next, for `scan`."""
     n = group.dim
     data = WeiNormanData(group)
@@ -169,7 +172,7 @@ def wei_norman_step(group: MatrixGroup) -> Kernel:
         return ([x + sixth * (a + 2 * (b + c) + e) for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
 
     return Kernel(
-        name="wei_norman_step",
+        name=name,
         namespace=group.name,
         inputs=(Port("g", (n,)), *(Port(name, (n,)) for name in ("u0", "um", "u1")), Port("h", (), "s")),
         outputs=(Port("g_next", (n,)),),

@@ -16,15 +16,17 @@ from lie_codegen.groups.wei_norman import body as wei_norman_body
 from lie_codegen.groups.wei_norman.chart_domain import chart_domain
 from lie_codegen.groups.wei_norman.matrix import wei_norman
 from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
 
 
-def wei_norman_determinant(group: MatrixGroup) -> Kernel:
+@kernel_factory()
+def wei_norman_determinant(group: MatrixGroup, name: str = "wei_norman_determinant") -> Kernel:
     """g -> det M(g)^{-1}, from its factored form; 1 at g = 0, and the chart ends where it vanishes."""
     wn = wei_norman(group)
     return Kernel(
-        name="wei_norman_determinant",
+        name=name,
         namespace=group.name,
         inputs=(Port("g", (group.dim,), description="Wei-Norman coordinates"),),
         outputs=(Port("det", (), description="det M(g)^-1"),),
@@ -34,7 +36,8 @@ def wei_norman_determinant(group: MatrixGroup) -> Kernel:
     )
 
 
-def chart_margin(group: MatrixGroup) -> Kernel:
+@kernel_factory()
+def chart_margin(group: MatrixGroup, name: str = "chart_margin") -> Kernel:
     """g -> margin, 1 at g = 0 and 0 at the edge of the chart, by which a simulation decides to restart it.
 
     Product of the walls, each 1 at g = 0; times sqrt(n) / |M(g)| (Frobenius) where an escape is possible. Constant 1 on a
@@ -57,7 +60,7 @@ def chart_margin(group: MatrixGroup) -> Kernel:
         return (margin * ops.sqrt(ops.constant(group.dim) / total),)
 
     return Kernel(
-        name="chart_margin",
+        name=name,
         namespace=group.name,
         inputs=(Port("g", (group.dim,), description="Wei-Norman coordinates"),),
         outputs=(Port("margin", (), description="1 at g = 0, 0 at the edge of the chart"),),

@@ -19,11 +19,13 @@ from lie_codegen.groups.maps.rkmk import bracket_body, hat_body, sum_products
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import add
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import plus
 from lie_codegen.steering.shooting.lie_poisson_ends import advance, correction, endpoint, offset, sparse_product
 
 
+@kernel_factory()
 def shooting_kernels(group: MatrixGroup, controls: tuple[int, ...]) -> tuple[Kernel, ...]:
     """All that the shooting solver needs to know about a group; elements of the group are packed."""
     return (
@@ -39,6 +41,7 @@ def shooting_kernels(group: MatrixGroup, controls: tuple[int, ...]) -> tuple[Ker
     )
 
 
+@kernel_factory()
 def transport(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     """(u, mu, X) -> (ad*_u mu, X hat(u)): bilinear in u and (mu, X)."""
 
@@ -55,6 +58,7 @@ def transport(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     )
 
 
+@kernel_factory()
 def costate_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     """(u at the start, in the middle and at the end, mu) -> mu in the middle (third order) and at the end of a step.
 
@@ -79,6 +83,7 @@ def costate_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     )
 
 
+@kernel_factory()
 def path_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     """(u at the start, in the middle and at the end, X) -> X after a Runge-Kutta step of X' = X hat(u)."""
     size, m = packed_size(group), len(controls)
@@ -98,6 +103,7 @@ def path_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     )
 
 
+@kernel_factory()
 def leap(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     """(v, before, here) -> before + 2 h f(here) for (mu, X), where v_i = 2 h / w_i: a substep of the midpoint rule."""
     n, size = group.dim, packed_size(group)
@@ -122,6 +128,7 @@ def leap(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
 _LEAP = ("mu_before", "X_before", "mu", "X")
 
 
+@kernel_factory()
 def flow_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     """(v, mu, X) -> (mu, X) after a classical Runge-Kutta step h, where v_i = h / w_i."""
     n, size = group.dim, packed_size(group)
@@ -144,6 +151,7 @@ def flow_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     )
 
 
+@kernel_factory()
 def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     """One column of the variational equations over a Runge-Kutta step h, where v_i = h / w_i.
 

@@ -11,12 +11,14 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import is_zero
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 
 #: Taylor degree of the exponential in the seed's logarithm, for |theta| below 1.
 SEED_EXPONENTIAL_DEGREE = 8
 
 
+@kernel_factory()
 def endpoint(group: MatrixGroup) -> Kernel:
     """(target, X) -> (F, q, G) with r = X - target: F = |r|^2, q_k = <X A_k, r>, G_kl = <X A_k, X A_l>.
 
@@ -49,6 +51,7 @@ def right_moves(group: MatrixGroup, ops: Arithmetic, X: Sequence[Scalar]) -> lis
     return [pack(group, sparse_product(matrix, hat_body(group, ops, unit))) for unit in units]
 
 
+@kernel_factory()
 def advance(group: MatrixGroup) -> Kernel:
     """(X, theta) -> X exp(hat(theta)) by a Taylor polynomial, for small theta."""
     size = packed_size(group)
@@ -66,6 +69,7 @@ def advance(group: MatrixGroup) -> Kernel:
     )
 
 
+@kernel_factory()
 def offset(group: MatrixGroup) -> Kernel:
     """X -> coordinates of X - I, projected on the algebra (Frobenius)."""
     d = group.degree
@@ -90,6 +94,7 @@ def offset(group: MatrixGroup) -> Kernel:
     )
 
 
+@kernel_factory()
 def correction(group: MatrixGroup) -> Kernel:
     """(x, y) -> z with exp(x) exp(y) = exp(z) to first order in y: z = x + y + [x, y] / 2 + [x, [x, y]] / 12."""
     n = group.dim

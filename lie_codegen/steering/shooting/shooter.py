@@ -125,7 +125,7 @@ def shooter(group: MatrixGroup, controls: tuple[int | str, ...]) -> Shooter:
 
     defaults = Defaults.of(group.dim, report.depth)
     name = f"{group.name}_steer"
-    definition = f"{group.definition}\ncontrols {report.controls} depth {report.depth}"
+    definition = f"{group.definition_text}\ncontrols {report.controls} depth {report.depth}"
     library = build_source(files, f"{name}.c", namespace=name, definition=definition)
     if library is None:
         from lie_codegen.steering.shooting.numpy_solver import NumpyShooting

@@ -19,7 +19,7 @@ def compiled(structure: Structure, solver: str) -> Path | None:
     """The library; None where there is no C compiler."""
     name = f"{structure.group.name}_nlp"
     shape = {key: value for key, value in vars(structure).items() if isinstance(value, int | tuple | bool)}
-    definition = f"{structure.group.definition}\n{solver} {sorted(shape.items())}"
+    definition = f"{structure.group.definition_text}\n{solver} {sorted(shape.items())}"
     return build_source(
         lambda: {f"{name}.c": source(structure, solver)}, f"{name}.c", namespace=name, definition=definition
     )
