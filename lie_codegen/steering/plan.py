@@ -22,7 +22,7 @@ class Status(Enum):
     APPROXIMATE = "approximate: the method reaches the target up to its own order; see .error"
     LOCAL = "solved: a local minimum of the energy, the best of the starts tried; more starts may find a better one"
     NOT_FOUND = "not found: the nearest of the starts tried, see .violation; that none exists is not proved"
-    NOT_CONVERGED = "not converged: the best found is returned, see .error; try a longer duration or more starts"
+    NOT_CONVERGED = "not converged: the best found is returned, see .error; more starts may find more"
 
     ADMISSIBLE = "admissible: all conditions are met, the iteration limit was reached before the cost settled"
     NOT_ADMISSIBLE = "not admissible: a condition is violated; see .worst and .violation"

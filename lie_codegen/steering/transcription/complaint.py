@@ -31,9 +31,7 @@ def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Se
     if first is not None:
         lines += _needs(task, structure, numbers, first[1])
     advice = "more starts or more intervals"
-    if not structure.free_time:
-        advice = f"a longer duration, {advice}"
-    elif numbers.longest < 1e3:
+    if structure.free_time and numbers.longest < 1e3:
         advice = f"a larger `longest`, {advice}"
     return "; ".join([*lines, f"try {advice}"])
 

@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lie_codegen.errors import ComputationError
+from lie_codegen.errors import ComputationError, NotFiniteError, ShapeError
+from lie_codegen.steering.obstacles.homotopy import planar_discs
+from lie_codegen.steering.obstacles.path_guess import PathGuess, moves_in_the_plane, path_guesses
+from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.extremals import SOLVED
 from lie_codegen.steering.shooting.shooter import shooter
@@ -23,6 +26,51 @@ Array = NDArray[Any]
 _NUDGE = 0.02
 _COARSE = 4
 _LOOSE = 1e-10
+
+
+def given_guess(task: Task, structure: Structure, numbers: Numbers, guess: Any) -> Array:
+    """The caller's controls as velocities (N + 1, m) in unit time: of a plan, or samples (k, m) at equal times.
+
+    Raises:
+        ShapeError, NotFiniteError: about the guess.
+    """
+    m, where = len(structure.controls), f"steer({task.group.name}): guess"
+    s = np.linspace(0, 1, structure.intervals + 1)
+    if isinstance(guess, Plan):
+        values = guess.u(s * guess.duration)[:, list(structure.controls)] * guess.duration
+    elif callable(guess):
+        values = np.array([np.asarray(guess(float(t)), dtype=float) for t in s * task.duration]) * task.duration
+    else:
+        samples = np.asarray(guess, dtype=float)
+        if samples.ndim != 2 or samples.shape[1] != m or len(samples) < 2:
+            raise ShapeError(f"{where} has shape {samples.shape}; give (k, {m}) samples, a function of t, or a plan")
+        there = np.linspace(0, 1, len(samples))
+        values = np.column_stack([np.interp(s, there, column) for column in samples.T]) * task.duration
+    if values.shape != (len(s), m):
+        raise ShapeError(f"{where} gives {values.shape[1:]} at a time; it must give ({m},)")
+    if not np.all(np.isfinite(values)):
+        raise NotFiniteError(f"{where} holds NaN or infinity")
+    return values
+
+
+def class_guesses(
+    task: Task, structure: Structure, numbers: Numbers, classes: int, turns: tuple[int, ...]
+) -> list[PathGuess]:
+    """Guesses along the shortest classes of ways between discs in the plane; none where there are no discs, or via points or
+    inertia ask for more than a path."""
+    discs = planar_discs(numbers.obstacles)
+    if discs is None or structure.via or numbers.dynamics is not None or not moves_in_the_plane(task.group):
+        return []
+    return path_guesses(task.group, discs, np.eye(task.group.degree), task.target, structure.intervals, classes, turns)
+
+
+def class_variables(structure: Structure, numbers: Numbers, guess: PathGuess) -> Array:
+    """The variables of such a guess; the program closes the gaps between its poses."""
+    v = guess.velocities[:, list(structure.controls)] - numbers.drift[list(structure.controls)]
+    scale = 1.0
+    if structure.free_time:
+        scale = float(np.clip(1.05 * np.max(numbers.ratios(v)), 1e-3, 0.9 * numbers.longest))
+    return joined(structure, guess.states, None, v / scale, scale)
 
 
 def guesses(task: Task, structure: Structure, numbers: Numbers, starts: int) -> Iterator[tuple[str, Array]]:

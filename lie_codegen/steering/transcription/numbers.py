@@ -36,6 +36,8 @@ class Options:
     intervals: int = 64
     starts: int = 3
     solver: str = "auto"
+    classes: int = 4
+    guess: Any = None
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,11 @@ def pose(task: Task, asked: Options) -> tuple[Structure, Numbers]:
 
 
 def _check_choices(asked: Options, where: str) -> None:
-    for name, value, least in (("intervals", asked.intervals, 4), ("starts", asked.starts, 1)):
+    for name, value, least in (
+        ("intervals", asked.intervals, 4),
+        ("starts", asked.starts, 1),
+        ("classes", asked.classes, 0),
+    ):
         if operator.index(value) < least:
             raise SteeringInputError(f"{where}: {name} must be at least {least}, got {value}")
     if asked.objective not in ("energy", "time"):

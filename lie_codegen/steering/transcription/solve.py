@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.steering.constraints import Cone
+from lie_codegen.steering.obstacles.tunnels import tunnels
 from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.flow import Flight, fly
@@ -122,6 +123,12 @@ def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candid
             )
             return failed if best is None else replace(best, solves=tuple(solves))
         flight = fly(task.group, task.controls, numbers, values, duration)
+        if tunnels(numbers.obstacles, flight.X):
+            # through a seam between discs, in one fast step: to enlarge the discs would find the next seam
+            tunnel = Candidate(
+                solve.objective, values, duration, solve.violation, np.inf, flight, solution, tuple(solves)
+            )
+            return tunnel if best is None else replace(best, solves=tuple(solves))
         cut = np.array([max(0.0, -float(np.min(each.clearance(flight.X)))) for each in numbers.obstacles])
         relative = np.linalg.solve(flight.X[-1], task.target)
         slip = np.zeros(task.group.dim) if second is None else second.ends[1] - flight.xi[-1]

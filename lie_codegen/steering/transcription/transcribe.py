@@ -9,7 +9,7 @@ is violated between the nodes, the obstacle is enlarged by as much and the progr
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,16 +23,27 @@ from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.complaint import complaint, ends_in_obstacles
 from lie_codegen.steering.transcription.flow import piecewise_linear
-from lie_codegen.steering.transcription.guess import first_variables, guesses
+from lie_codegen.steering.transcription.guess import (
+    class_guesses,
+    class_variables,
+    first_variables,
+    given_guess,
+    guesses,
+)
 from lie_codegen.steering.transcription.numbers import Numbers, Options
+from lie_codegen.steering.transcription.outcome import classes_found, nearest_flown
 from lie_codegen.steering.transcription.pose import pose
 from lie_codegen.steering.transcription.problem import endable, program
-from lie_codegen.steering.transcription.solve import Candidate, Workbench, predicted_aim, refined
+from lie_codegen.steering.transcription.solve import Aim, Candidate, Workbench, predicted_aim, refined
 from lie_codegen.steering.transcription.structure import Structure
 
 Array = NDArray[Any]
 
 _FALLBACK = 4
+#: Full turns added to the end heading of paths between discs.
+_TURNS = (0, 1, -1)
+#: Clearance (of squared distances, or cosines) above which an obstacle does not hold.
+_IDLE = 1e-5
 
 
 def transcription(
@@ -56,6 +67,8 @@ def transcription(
     intervals: int = 64,
     starts: int = 3,
     solver: str = "auto",
+    classes: int = 4,
+    guess: Any = None,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Minimum energy, or minimum time, under constraints; controls are continuous and linear on each interval.
@@ -81,6 +94,9 @@ def transcription(
         starts: first guesses tried; the cheapest admissible result wins.
         solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere; ipopt alone where the controls are periodic,
             or do not reach all without the drift or the inertia. Or "fatrop" or "ipopt".
+        classes: shortest classes of ways between discs in the plane (`Ball`s on SE(2)) tried beside the other guesses, each with three
+            end headings; 0 for none. All that were found are in details["classes"]: word, cost, clearance.
+        guess: controls to start from beside the others: a Plan, or samples (k, m) at equal times.
         progress: called with one line a solve, and within a long one by ipopt every second. What was done is in the plan's
             details["solves"] in any case: start, solver, iterations, objective, violation, seconds and ipopt's residuals.
 
@@ -122,12 +138,18 @@ def _run(
         built = program(shape, name, listening=progress is not None)
         building += time.perf_counter() - began
         bench = Workbench(task, shape, numbers, built, progress or (lambda line: None))
-        candidates += _candidates(bench, asked.starts)
+        candidates += _candidates(bench, asked)
         if any(candidate.admissible for candidate in candidates):
             break
     good = [candidate for candidate in candidates if candidate.admissible]
     if not good:
-        raise SteeringError(complaint(task, structure, numbers, candidates))
+        said = complaint(task, structure, numbers, candidates)
+        nearest = nearest_flown(task, numbers, candidates)
+        if nearest is None:
+            raise SteeringError(said)
+        took = {"build": building, "solve": time.perf_counter() - started - building}
+        plan = _plan(task, structure, numbers, method, tried, candidates, nearest, took, Status.NOT_FOUND)
+        raise SteeringError(said, best=plan, violation=plan.violation)
     best = min(good, key=lambda candidate: candidate.objective)
     seconds = {"build": building, "solve": time.perf_counter() - started - building}
     return _plan(task, structure, numbers, method, tried, candidates, best, seconds)
@@ -143,15 +165,35 @@ def _solvers(task: Task, structure: Structure, asked: Options) -> tuple[str, ...
     return ("fatrop", "ipopt")
 
 
-def _candidates(bench: Workbench, starts: int) -> list[Candidate]:
+def _candidates(bench: Workbench, asked: Options) -> list[Candidate]:
     found = []
-    for name, v in guesses(bench.task, bench.structure, bench.numbers, starts):
+    for name, v in _guesses(bench, asked):
         try:
             first = first_variables(bench.task, bench.structure, bench.numbers, v)
             found.append(refined(bench, name, first, predicted_aim(bench, first)))
         except ComputationError as error:
             bench.say(f"from {name}: {error}")
+    if found and found[0].admissible and _idle(bench.numbers, found[0]):
+        return found  # the first guess is the optimum without obstacles, and meets none of them
+    for each in class_guesses(bench.task, bench.structure, bench.numbers, asked.classes, _TURNS):
+        first = class_variables(bench.structure, bench.numbers, each)
+        found.append(refined(bench, each.name, first, Aim(bench.task.target, np.zeros(bench.task.group.dim))))
     return found
+
+
+def _idle(numbers: Numbers, candidate: Candidate) -> bool:
+    """Whether no obstacle holds a candidate."""
+    flight = candidate.flight
+    if flight is None:
+        return False
+    return all(float(np.min(each.clearance(flight.X))) > _IDLE for each in numbers.obstacles)
+
+
+def _guesses(bench: Workbench, asked: Options) -> Iterator[tuple[str, Array]]:
+    """The caller's own, and the others."""
+    yield from guesses(bench.task, bench.structure, bench.numbers, asked.starts)
+    if asked.guess is not None:
+        yield "the guess given", given_guess(bench.task, bench.structure, bench.numbers, asked.guess)
 
 
 def _plan(
@@ -163,6 +205,7 @@ def _plan(
     candidates: Sequence[Candidate],
     best: Candidate,
     seconds: dict[str, float],
+    status: Status | None = None,
 ) -> Plan:
     values = best.values / task.duration**numbers.power
     duration = best.duration * task.duration
@@ -187,6 +230,7 @@ def _plan(
         "drift": numbers.drift / task.duration,
         "optimality": "a local minimum of the discretised problem, the best of the starts tried",
         "fine_times": flight.t * task.duration,
+        "classes": classes_found(numbers, candidates, task.duration, time=structure.free_time),
     }
     error, slip = distance(group, task.target, flight.X[-1]), 0.0
     if numbers.dynamics is not None:
@@ -201,6 +245,11 @@ def _plan(
             "velocity_peaks": tuple(float(x) for x in np.max(np.abs(xi), axis=0)),
         }
     solved = max(error, slip * duration) <= task.tolerance
+    details["violation"] = {
+        "end": error,
+        "conditions": best.violation,
+        "clearance": max([0.0, *(-x for x in details["clearances"])]),
+    }
     return Plan(
         group=group,
         target=task.target,
@@ -211,7 +260,7 @@ def _plan(
         cost=float(np.sum(a * a + a * b + b * b)) * duration / (3 * structure.intervals),
         X_final=flight.X[-1],
         error=error,
-        status=Status.LOCAL if solved else Status.NOT_CONVERGED,
+        status=status or (Status.LOCAL if solved else Status.NOT_CONVERGED),
         seconds=seconds,
         details=details,
     )
