@@ -107,13 +107,24 @@ static void add_transposed(real *C, const real *A, const real *B, int inner, int
     }
 }
 
-/* Adds L' H L to Q (NV x NV), L (size x NV), H symmetric (size x size), size <= NC. */
-static void add_pulled_back(real *Q, const real *H, const real *L, int size)
+/* Adds L' W L to Q (NV x NV) and L' w to q, for L = (J; 0 I): what a cost of (F(x, u), u) is as one of (d, u). */
+static void add_pulled_back(real *Q, real *q, const real *W, const real *w, const real *J)
 {
-    real T[(NC > NV ? NC : NV) * NV];
-    clear(T, size * NV);
-    add_product(T, H, L, size, size, NV, 1);
-    add_transposed(Q, L, T, size, NV, NV);
+    real T[NV * NV];
+    int i;
+    clear(T, NV * NV);
+    for (i = 0; i < NV; ++i) {
+        copy(T + i * NV + NX, W + i * NV + NX, OCP_M);
+        add_product(T + i * NV, W + i * NV, J, 1, NX, NV, 1);
+    }
+    add_transposed(Q, J, T, NX, NV, NV);
+    for (i = 0; i < OCP_M * NV; ++i) {
+        Q[NX * NV + i] += T[NX * NV + i];
+    }
+    add_transposed(q, J, w, NX, NV, 1);
+    for (i = 0; i < OCP_M; ++i) {
+        q[NX + i] += w[NX + i];
+    }
 }
 
 /* x_{k+1} = F(x, u): an explicit Runge-Kutta step in canonical coordinates around X, theta' = dexpinv_theta(xi). */
@@ -190,20 +201,42 @@ static void linear_step(const real *x, const real *u, const real *p, real t, rea
 }
 
 #if OCP_SECOND_ORDER
+/* Adds L' H L for the L of a stage's arguments by (d, u): eta and u are unit rows, theta those of Y, z a unit row and one of Y. */
+static void add_chained(real *Q, const real *H, const real *Y)
+{
+    real T[NC * NV];
+    int i, j;
+    for (i = 0; i < NC; ++i) {
+        copy(T + i * NV, H + i * NC, OCP_DIM);
+        copy(T + i * NV + OCP_DIM, H + i * NC + 2 * OCP_DIM, OCP_Q + OCP_M);
+        add_product(T + i * NV, H + i * NC + OCP_DIM, Y, 1, NX, NV, 1);
+    }
+    for (i = 0; i < NV; ++i) {
+        const real *row_of = T + (i < OCP_DIM ? i : i + OCP_DIM) * NV;
+        for (j = 0; j < NV; ++j) {
+            Q[i * NV + j] += row_of[j];
+        }
+    }
+    add_transposed(Q, Y, T + OCP_DIM * NV, NX, NV, NV);
+}
+
 /* Adds the Hessian of mu . F by (d, u) to H (NV x NV): from the end of the chain to its beginning. */
 static void add_step_curvature(const real *x, const real *u, const real *p, real t, real h, const chain *c,
     const real *mu, real *H)
 {
-    real ends[4 * OCP_DIM * OCP_DIM], L[NC * NV], curve[NC * NC], nu[NX], m[NX], back[NX];
+    real ends[4 * OCP_DIM * OCP_DIM], T[2 * OCP_DIM * NV], curve[NC * NC], nu[NX], m[NX], back[NX];
     int i, j, s;
     /* the end of the chain, X exp(eta) exp(Theta + dTheta): second order in (eta, dTheta) */
     model_move_hessian(c->total, mu, ends);
-    clear(L, 2 * OCP_DIM * NV);
-    for (i = 0; i < OCP_DIM; ++i) {
-        L[i * NV + i] = 1;
+    clear(T, 2 * OCP_DIM * NV);
+    for (i = 0; i < 2 * OCP_DIM; ++i) {
+        copy(T + i * NV, ends + i * 2 * OCP_DIM, OCP_DIM);
+        add_product(T + i * NV, ends + i * 2 * OCP_DIM + OCP_DIM, c->total_slope, 1, OCP_DIM, NV, 1);
     }
-    copy(L + OCP_DIM * NV, c->total_slope, OCP_DIM * NV);
-    add_pulled_back(H, ends, L, 2 * OCP_DIM);
+    for (i = 0; i < OCP_DIM * NV; ++i) {
+        H[i] += T[i];
+    }
+    add_transposed(H, c->total_slope, T + OCP_DIM * NV, OCP_DIM, NV, NV);
     clear(nu, NX);
     add_transposed(nu, c->right, mu, OCP_DIM, OCP_DIM, 1);
     copy(nu + OCP_DIM, mu + OCP_DIM, OCP_Q);
@@ -213,15 +246,7 @@ static void add_step_curvature(const real *x, const real *u, const real *p, real
             m[i] = h * rk_b[s] * nu[i] + back[i];
         }
         model_stage_hessian(x, c->y[s], u, p, t + rk_c[s] * h, m, curve);
-        clear(L, NC * NV);
-        for (i = 0; i < OCP_DIM; ++i) {
-            L[i * NV + i] = 1;
-        }
-        copy(L + OCP_DIM * NV, c->slope[s], NX * NV);
-        for (i = 0; i < OCP_Q + OCP_M; ++i) {
-            L[(2 * OCP_DIM + i) * NV + OCP_DIM + i] += 1;
-        }
-        add_pulled_back(H, curve, L, NC);
+        add_chained(H, curve, c->slope[s]);
         clear(back, NX);
         for (i = 0; s > 0 && i < NX; ++i) {
             for (j = 0; j < NX; ++j) {
@@ -495,20 +520,6 @@ static int box_program(const real *Q, const real *q, const real *low, const real
     return count;
 }
 
-/* Adds what a node of the quadrature with its own derivative J of x (NX x NV) adds to the Hessian and the gradient. */
-static void add_node(const real *W, const real *w, const real *J, real *Q, real *q)
-{
-    real L[NV * NV];
-    int i;
-    clear(L, NV * NV);
-    copy(L, J, NX * NV);
-    for (i = 0; i < OCP_M; ++i) {
-        L[(NX + i) * NV + NX + i] = 1;
-    }
-    add_pulled_back(Q, W, L, NV);
-    add_transposed(q, L, w, NV, NV, 1);
-}
-
 static real cost_terms(const task *s, const real *x, const real *u, const real *p, real t, real *gradient, real *H)
 {
     real value;
@@ -607,7 +618,7 @@ static real stage_model(const task *s, int k, const real *P, const real *v, real
         }
     }
     linear_step(x, u, p, t, OCP_H, next, J, &c);
-    add_node(W, weighted, J, Q, q);
+    add_pulled_back(Q, q, W, weighted, J);
 #if OCP_SECOND_ORDER
     if (s->exact) {
         add_step_curvature(x, u, p, t, OCP_H, &c, weighted, Q);
@@ -631,7 +642,7 @@ static real stage_model(const task *s, int k, const real *P, const real *v, real
             for (i = 0; i < NV; ++i) {
                 gradient[i] *= node_w[n];
             }
-            add_node(H, gradient, J, Q, q);
+            add_pulled_back(Q, q, H, gradient, J);
 #if OCP_SECOND_ORDER
             if (s->exact) {
                 add_step_curvature(x, u, p, t, node_c[n] * OCP_H, &c, gradient, Q);

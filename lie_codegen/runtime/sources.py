@@ -17,7 +17,12 @@ SOLVER_FLAGS = ("-O2", "-march=native", "-std=c99", "-fno-math-errno", "-ffp-con
 
 
 def build_source(
-    make_files: Callable[[], Mapping[str, str]], main: str, *, namespace: str, definition: str
+    make_files: Callable[[], Mapping[str, str]],
+    main: str,
+    *,
+    namespace: str,
+    definition: str,
+    more_flags: tuple[str, ...] = (),
 ) -> Path | None:
     """The shared library of some C files, from the cache where it is there; None where there is no compiler.
 
@@ -26,6 +31,7 @@ def build_source(
         main: the file to compile.
         namespace: C identifier, the stem of the library's file name.
         definition: text that, with the source of this package, determines the files.
+        more_flags: behind `SOLVER_FLAGS`.
 
     Raises:
         CompileError: a compiler that works refuses the text.
@@ -35,20 +41,20 @@ def build_source(
     if not compilers:
         warn_no_compiler()
         return None
-    folder = usable_folder()
+    folder, flags = usable_folder(), (*SOLVER_FLAGS, *more_flags)
     for compiler in compilers:
-        entry = cache.find_entry(folder, _key(compiler, namespace, definition))
+        entry = cache.find_entry(folder, _key(compiler, namespace, definition, flags))
         if entry is not None:
             return entry.library
     files = make_files()
     try:
-        return _compile(folder, files, main, namespace, definition, compilers)
+        return _compile(folder, files, main, namespace, definition, compilers, flags)
     except OSError as error:
         reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
-        return _compile(temporary_folder(reason), files, main, namespace, definition, compilers)
+        return _compile(temporary_folder(reason), files, main, namespace, definition, compilers, flags)
 
 
-def _key(compiler: Compiler, namespace: str, definition: str) -> str:
+def _key(compiler: Compiler, namespace: str, definition: str, flags: tuple[str, ...]) -> str:
     return digest(
         {
             "source": namespace,
@@ -56,7 +62,7 @@ def _key(compiler: Compiler, namespace: str, definition: str) -> str:
             "package": package_digest(),
             "templates": templates_digest(),
             "versions": versions(),
-            "flags": SOLVER_FLAGS,
+            "flags": flags,
             "compiler": compiler.identity,
             "cpu": cpu_identity(),
         }
@@ -70,12 +76,13 @@ def _compile(
     namespace: str,
     definition: str,
     compilers: tuple[Compiler, ...],
+    flags: tuple[str, ...],
 ) -> Path:
     def attempt(number: int, compiler: Compiler) -> cache.Entry:
-        key = _key(compiler, namespace, definition)
+        key = _key(compiler, namespace, definition, flags)
         with cache.lock(folder, key):
             return cache.find_entry(folder, key) or compile_entry(
-                folder, key, files, main, namespace, compiler, SOLVER_FLAGS
+                folder, key, files, main, namespace, compiler, flags
             )
 
     entry = first_that_works(folder, compilers, attempt)

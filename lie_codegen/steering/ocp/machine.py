@@ -84,6 +84,8 @@ _LOCK = threading.RLock()
 #: Solvers of this process by the identity of their problem: two kernels may look alike and differ in their bodies.
 _BUILT: OrderedDict[tuple[int, bool], tuple[ProblemData, Machine]] = OrderedDict()
 _MOST = 64
+#: The core's small dense products: a third of the time less on the quadrotor (gcc 12; -O3, which unrolls too, gains half of that).
+_FLAGS = ("-ftree-vectorize",)
 
 
 def machine_of(data: ProblemData, *, second_order: bool) -> Machine:
@@ -119,7 +121,9 @@ def build_machine(data: ProblemData, *, second_order: bool) -> Machine:
     # the text itself is the key: a user's kernel is code of which nothing else is known
     text = "".join(f"{name}\n{files[name]}" for name in sorted(files))
     definition = hashlib.sha256(text.encode()).hexdigest()
-    path = build_source(lambda: files, f"{data.name}.c", namespace=data.name, definition=definition)
+    path = build_source(
+        lambda: files, f"{data.name}.c", namespace=data.name, definition=definition, more_flags=_FLAGS
+    )
     if path is not None:
         return CompiledMachine(load_library(path), data, model.sizes, model.row_names)
     from lie_codegen.steering.ocp.interpreted import InterpretedMachine
