@@ -154,3 +154,7 @@ class AssumptionError(InputError):
 
 class AssumptionWarning(UserWarning):
     """A theorem is used where one of its conditions fails; names both."""
+
+
+class SpreadWarning(UserWarning):
+    """A covariance so wide that its Gaussian passes the cut of the logarithm."""

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.flow.chart import mismatch, newton
 from lie_codegen.flow.libraries import integrators, logarithms
+from lie_codegen.groups.maps.admission import Admitted, admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 Array = NDArray[Any]
 
-_ON_GROUP = 1e-8
 #: Nearer to the identity than this the series of the logarithm to third order is exact to rounding.
 _NEAR = 1e-5
 _BEFORE_CUT = 3.1
@@ -176,36 +176,31 @@ def _linearised(group: MatrixGroup, g: Array, target: Array) -> tuple[Array, Arr
 
 
 def group_element(group: MatrixGroup, value: ArrayLike, where: str) -> Array:
-    """An element of the group from a (d, d) matrix, or from (n,) coordinates of the second kind.
+    """An element of the group from a (d, d) matrix, projected where it is near the group, or from (n,) coordinates of the
+    second kind.
 
     Raises:
         ShapeError, NotFiniteError: naming `where`.
         NotOnGroupError: a matrix off the group; says how far.
     """
-    kind: Any = complex if group.is_complex else float
+    return admitted_element(group, value, where).X
+
+
+def admitted_element(group: MatrixGroup, value: ArrayLike, where: str) -> Admitted:
+    """As `group_element`, with the distance to what was given.
+
+    Raises:
+        ShapeError, NotFiniteError, NotOnGroupError: as `group_element`.
+    """
+    if np.shape(value) != (group.dim,):
+        try:
+            return admitted(group, value, where)
+        except ShapeError as error:
+            raise ShapeError(f"{error}; or give ({group.dim},) coordinates of the second kind") from None
     try:
-        given = np.asarray(value)
-        array = given.astype(kind) if not (np.iscomplexobj(given) and kind is float) else None
+        g = np.ascontiguousarray(value, dtype=float)
     except (TypeError, ValueError):
-        array = None
-    d, n = group.degree, group.dim
-    if array is None or array.shape not in ((d, d), (n,)):
-        shape = "of numbers it cannot take" if array is None else f"of shape {array.shape}"
-        raise ShapeError(
-            f"{where}: an array {shape}; give a ({d}, {d}) matrix or ({n},) coordinates of the second kind"
-        )
-    if not np.all(np.isfinite(array)):
+        raise ShapeError(f"{where}: coordinates of the second kind are real numbers, got {value!r:.60}") from None
+    if not np.all(np.isfinite(g)):
         raise NotFiniteError(f"{where} holds NaN or infinity")
-    if array.shape == (n,):
-        return np.asarray(integrators(group).product_exp(np.ascontiguousarray(array.real, dtype=float)))
-    if abs(np.linalg.det(array)) < 1e-12:
-        raise NotOnGroupError(f"{where}: a singular matrix is not on the group {group.name}")
-    scale = max(1.0, float(np.max(np.abs(array))))
-    _, off = matrix_log(group, array)
-    if off <= _ON_GROUP * scale:
-        return array
-    try:
-        second_kind(group, array)
-    except NotOnGroupError as error:
-        raise NotOnGroupError(f"{where} is not on the group {group.name}: {error}") from None
-    return array
+    return Admitted(np.asarray(integrators(group).product_exp(g)), 0.0)

@@ -16,7 +16,7 @@ from lie_codegen.flow.inputs import Signal, as_signal
 from lie_codegen.flow.libraries import step_of
 from lie_codegen.flow.restarts import Chart, restarted_charts
 from lie_codegen.flow.rollout import rollout
-from lie_codegen.groups.invariants import check_invariants
+from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 
 Array = NDArray[Any]
@@ -99,7 +99,7 @@ def simulate(
 
     Raises:
         ShapeError, NotFiniteError, InputError: naming the argument.
-        NotOnGroupError: X0 breaks a condition that every element of the group meets.
+        NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
         ComputationError: the tolerance is not reached with the steps that can be taken: 67 million, 8 million for a u
             that is no formula.
     """
@@ -194,5 +194,5 @@ def _initial(group: MatrixGroup, X0: ArrayLike | None) -> Array:
         )
     if not np.all(np.isfinite(start)):
         raise NotFiniteError(f"simulate({group.name}): X0 holds NaN or infinity")
-    check_invariants(group, start, f"simulate({group.name}): X0")
-    return start
+    where = f"simulate({group.name}): X0"
+    return admitted(group, start, where).X if start.ndim == 2 else admitted_all(group, start, where)[0]

@@ -24,6 +24,15 @@ def group(name_or_path: str | Path) -> MatrixGroup:
     return group_of_source(name_or_path, definition_source(name_or_path))
 
 
+def as_group(value: MatrixGroup | str | Path) -> MatrixGroup:
+    """The group itself, or that of a name or a file: what every function takes in the place of a group.
+
+    Raises:
+        UnknownGroupError, GroupFileError, InputError: as `group`.
+    """
+    return value if isinstance(value, MatrixGroup) else group(value)
+
+
 def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:
     """The group whose `definition_source` was read before, whatever the file holds now.
 

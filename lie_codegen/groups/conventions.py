@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
+from lie_codegen.groups.maps.admission import NEAR_GROUP, ON_GROUP
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 Array = NDArray[np.float64]
@@ -124,15 +125,18 @@ def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array
     Raises:
         InputError: another order.
         ShapeError: the last axes are not (3, 3).
-        NotOnGroupError: a matrix is not a rotation to 1e-9.
+        NotOnGroupError: a matrix is not a rotation to 1e-5; nearer ones, as in single precision, are projected.
     """
     matrix = np.asarray(R, dtype=float)
     if matrix.shape[-2:] != (3, 3):
         raise ShapeError(f"R has shape {matrix.shape}; its last axes must be (3, 3)")
     places = _quaternion_order(order)
     off = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
-    if not (off <= 1e-9 and np.all(np.linalg.det(matrix) > 0)):
+    if not (off <= NEAR_GROUP and np.all(np.linalg.det(matrix) > 0)):
         raise NotOnGroupError(f"R is not a rotation: |R R^T - I| is {off:.3g}, or det R < 0")
+    if off > ON_GROUP:
+        left, _, right = np.linalg.svd(matrix)
+        matrix = left @ right
     r = np.moveaxis(matrix, (-2, -1), (0, 1))
     a, b, c = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
     d, e, f = r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1]

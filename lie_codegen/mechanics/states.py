@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.errors import NotOnGroupError, ShapeError
+from lie_codegen.errors import ShapeError
+from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -19,7 +20,7 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
 
     Raises:
         ShapeError: X0 or xi0 has another shape.
-        NotOnGroupError: an entry that is 0 or 1 in every element of the group is not.
+        NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
     """
     d, n = group.degree, group.dim
     kind = complex if group.is_complex else float
@@ -29,12 +30,9 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
         raise ShapeError(f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},)")
     many = X.ndim == 3 or xi.ndim == 2
     count = max(X.shape[0] if X.ndim == 3 else 1, xi.shape[0] if xi.ndim == 2 else 1)
+    X = admitted(group, X, "X0").X if X.ndim == 2 else admitted_all(group, X, "X0")[0]
     X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
     rows, columns = np.array(varying_entries(group)).T
-    fixed = np.ones((d, d), bool)
-    fixed[rows, columns] = False
-    if np.max(np.abs((X - np.eye(d))[:, fixed]), initial=0.0) > 1e-9:
-        raise NotOnGroupError(f"X0 is not on {group.name}: an entry that is 0 or 1 in every element is not")
     entries = np.ascontiguousarray(X[:, rows, columns])
     flat = entries.view(float) if group.is_complex else entries
     return np.ascontiguousarray(np.concatenate([flat.reshape(count, -1), xi], axis=1)), many

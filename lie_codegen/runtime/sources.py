@@ -81,9 +81,7 @@ def _compile(
     def attempt(number: int, compiler: Compiler) -> cache.Entry:
         key = _key(compiler, namespace, definition, flags)
         with cache.lock(folder, key):
-            return cache.find_entry(folder, key) or compile_entry(
-                folder, key, files, main, namespace, compiler, flags
-            )
+            return cache.find_entry(folder, key) or compile_entry(folder, key, files, main, namespace, compiler, flags)
 
     entry = first_that_works(folder, compilers, attempt)
     evict(folder, keep=entry.library.parent.name)

@@ -179,13 +179,13 @@ def test_a_start_off_the_group_is_refused_and_one_on_it_is_not(name: str) -> Non
         X = X @ expm(group.hat(0.4 * rng.normal(size=group.dim)))
     zero = np.zeros(group.dim)
     np.testing.assert_array_equal(lc.simulate(group, zero, t=[0, 1], X0=X).X[0], X)
-    for off in (2 * X, X + 1e-5 * rng.normal(size=X.shape), np.zeros_like(X)):
+    for off in (2 * X, X + 1e-3 * rng.normal(size=X.shape), np.zeros_like(X)):
         with pytest.raises(NotOnGroupError, match="X0 is not on"):
             lc.simulate(group, zero, t=[0, 1], X0=off)
 
 
 def test_another_component_of_the_orthogonal_group_is_refused() -> None:
-    with pytest.raises(NotOnGroupError, match="determinant"):
+    with pytest.raises(NotOnGroupError, match="det X"):
         lc.simulate(lc.group("so3"), np.zeros(3), t=[0, 1], X0=np.diag([1, 1, -1.0]))
 
 

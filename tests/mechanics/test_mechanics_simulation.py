@@ -165,7 +165,7 @@ def test_wrong_references_and_states_are_refused() -> None:
         waypoint_reference(so3, [0, 1, 1], [eye] * 3)
     with pytest.raises(InputError, match="no unique way"):
         waypoint_reference(so3, [0, 1], [eye, np.diag([1.0, -1, -1])])
-    with pytest.raises(NotOnGroupError, match="waypoint 2"):
+    with pytest.raises(NotOnGroupError, match="waypoint 2 is not on the group"):
         waypoint_reference(so3, [0, 1], [eye, 1.1 * eye])
     with pytest.raises(InputError, match="needs 3 formulas"):
         formula_reference(so3, ["t"])
@@ -176,7 +176,7 @@ def test_wrong_references_and_states_are_refused() -> None:
         closed_loop(so3, inertia=1, xi0=[1, 2], t=[0, 1])
     with pytest.raises(InputError, match="equal steps"):
         closed_loop(so3, inertia=1, t=[0, 1, 3])
-    with pytest.raises(NotOnGroupError, match="not on se3"):
+    with pytest.raises(NotOnGroupError, match="not on the group se3"):
         closed_loop(load("se3"), inertia=1, X0=np.ones((4, 4)), t=[0, 1])
     with pytest.raises(ComputationError, match="do not bring the error below"):
         closed_loop(so3, inertia=[1, 2, 3], xi0=[1e5, 1e5, 0], t=[0, 1000], tolerance=1e-14)

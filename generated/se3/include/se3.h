@@ -169,6 +169,24 @@ void se3_ljac_inv(const double x[6], double J_inv[36]);
  */
 void se3_rjac_inv(const double x[6], double J_inv[36]);
 
+/*
+ * se3_defect
+ *   the largest relative violation of what every element keeps: forms, determinant, fixed entries, signs
+ *   in  X: (4, 4) matrix, row-major; element of the group
+ *   out defect: scalar
+ *   Source: the conditions that the basis implies, found exactly
+ */
+void se3_defect(const double X[16], double defect[1]);
+
+/*
+ * se3_renormalise
+ *   one step towards the group: X (3 - X* X)/2 on blocks that keep a form, X det(X)^(-1/n)
+ *   in  X: (4, 4) matrix, row-major; element of the group
+ *   out Y: (4, 4) matrix, row-major; element of the group
+ *   Source: Higham, Functions of Matrices (2008), (8.20); any form in place of 1
+ */
+void se3_renormalise(const double X[16], double Y[16]);
+
 #ifdef __cplusplus
 }
 #endif

@@ -163,6 +163,24 @@ void so3_ljac_inv(const double x[3], double J_inv[9]);
  */
 void so3_rjac_inv(const double x[3], double J_inv[9]);
 
+/*
+ * so3_defect
+ *   the largest relative violation of what every element keeps: forms, determinant, fixed entries, signs
+ *   in  X: (3, 3) matrix, row-major; element of the group
+ *   out defect: scalar
+ *   Source: the conditions that the basis implies, found exactly
+ */
+void so3_defect(const double X[9], double defect[1]);
+
+/*
+ * so3_renormalise
+ *   one step towards the group: X (3 - X* X)/2 on blocks that keep a form, X det(X)^(-1/n)
+ *   in  X: (3, 3) matrix, row-major; element of the group
+ *   out Y: (3, 3) matrix, row-major; element of the group
+ *   Source: Higham, Functions of Matrices (2008), (8.20); any form in place of 1
+ */
+void so3_renormalise(const double X[9], double Y[9]);
+
 #ifdef __cplusplus
 }
 #endif

@@ -121,9 +121,7 @@ def build_machine(data: ProblemData, *, second_order: bool) -> Machine:
     # the text itself is the key: a user's kernel is code of which nothing else is known
     text = "".join(f"{name}\n{files[name]}" for name in sorted(files))
     definition = hashlib.sha256(text.encode()).hexdigest()
-    path = build_source(
-        lambda: files, f"{data.name}.c", namespace=data.name, definition=definition, more_flags=_FLAGS
-    )
+    path = build_source(lambda: files, f"{data.name}.c", namespace=data.name, definition=definition, more_flags=_FLAGS)
     if path is not None:
         return CompiledMachine(load_library(path), data, model.sizes, model.row_names)
     from lie_codegen.steering.ocp.interpreted import InterpretedMachine
