@@ -42,7 +42,7 @@ enum {
 
 /* As `_Programme` of compiled.py. */
 typedef struct {
-    int exponentials, slots, rows, entry_lanes, free_phase, fuel, reach_iterations, descend_iterations;
+    int exponentials, slots, rows, entry_lanes, free_phase, fuel, reach_iterations, descend_iterations, wanted;
     double enough, damping, relative;
     const double *start;      /* (D, D) L X0 */
     const double *right;      /* (D, D) R */
@@ -578,9 +578,9 @@ static void take(const task *w, Mask where, point *to, const point *from)
 
 /*
  * Levenberg and Marquardt's steps from at->u, projected on the bounds, in lanes of `active`: the normal matrix is that of
- * the goal (N x N), not that of the controls. Adds the steps of each lane to `used`.
+ * the goal (N x N), not that of the controls. Ends when `wanted` lanes are there. Adds the steps of each lane to `used`.
  */
-static void arrive(task *w, point *at, Mask active, int iterations, double enough, double damping, int *used)
+static void arrive(task *w, point *at, Mask active, int iterations, double enough, double damping, int wanted, int *used)
 {
     V lambda = spread(damping);
     int step, l;
@@ -588,7 +588,11 @@ static void arrive(task *w, point *at, Mask active, int iterations, double enoug
     for (step = 0; step < iterations; ++step) {
         const Mask open = active & LESS(spread(enough), at->size) & LESS(lambda, spread(1e8));
         Mask better;
-        if (!any(open)) {
+        int there = 0;
+        for (l = 0; l < LANES; ++l) {
+            there += LANE(at->size, l) <= enough;
+        }
+        if (!any(open) || there >= wanted) {
             return;
         }
         damped_step(w, at, lambda, w->trial.u);
@@ -786,7 +790,7 @@ void direct_reach(const programme *p, int lanes, double *u, double *size, int *u
         int steps[LANES] = {0};
         begin(&w, p, lanes, first, memory);
         read_lanes(&w, u, w.at.u);
-        arrive(&w, &w.at, everywhere(), p->reach_iterations, p->enough, p->damping, steps);
+        arrive(&w, &w.at, everywhere(), p->reach_iterations, p->enough, p->damping, p->wanted, steps);
         write_lanes(&w, lanes, first, &w.at, u, size);
         for (l = 0; l < LANES && first + l < lanes; ++l) {
             used[first + l] = steps[l];
@@ -850,7 +854,7 @@ void direct_descend(const programme *p, int lanes, double *u, double *size, doub
             for (c = 0; c < w.columns; ++c) {
                 w.at.u[c] = w.v[c];
             }
-            arrive(&w, &w.at, open, 12, p->enough, 1e-9, NULL);
+            arrive(&w, &w.at, open, 12, p->enough, 1e-9, LANES + 1, NULL);
             found = objective(&w, w.at.u);
             better = open & LESS(w.at.size, spread(enough)) & LESS(found, best);
             gain = SELECT(better, best - found, spread(0.0));

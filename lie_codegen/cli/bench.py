@@ -9,22 +9,37 @@ import typer
 
 from lie_codegen.cli.groups import Json
 from lie_codegen.cli.output import emit, progress
+from lie_codegen.errors import InputError
 
 if TYPE_CHECKING:
     from lie_codegen.benchmarks.run import Bench
 
 
 def bench(
+    what: Annotated[str, typer.Argument(help='"" for everything that is timed, "steering" for bounded steering.')] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
     only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
     json: Json = False,
 ) -> None:
     """Time calls, batches, loops and cold starts against numba, jax, SymForce, CasADi, ...; ratios to ours."""
+    if what == "steering":
+        _steering(only, json)
+        return
+    if what:
+        raise InputError(f'bench: nothing is called {what!r}; there is "steering", or nothing for everything else')
     from lie_codegen.benchmarks.run import bench as measure
 
     with progress("bench") as report:
         result = measure(rounds, report, only)
     emit(_text(result), asdict(result), json)
+
+
+def _steering(only: str, json: bool) -> None:
+    from lie_codegen.benchmarks.bounded import bench_bounded, table
+
+    with progress("bench steering") as report:
+        rows = bench_bounded(only=only, say=report)
+    emit(table(rows), {"rows": [asdict(row) for row in rows]}, json)
 
 
 def _text(result: Bench) -> str:

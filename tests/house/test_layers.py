@@ -29,6 +29,8 @@ ALLOWED = {
     "dask": {"studies", "benchmarks"},
     "rockit": {"benchmarks"},
     "crocoddyl": {"benchmarks"},
+    "qutip": {"benchmarks"},
+    "qutip_qtrl": {"benchmarks"},
     "mpmath": {"gallery"},
     "matplotlib": {"pictures", "gallery"},
     "typer": {"cli"},

@@ -264,3 +264,11 @@ def test_numpy_finds_what_the_compiled_search_finds() -> None:
         assert np.all(reached.size < 1e-10)
         costs.append(np.min(solver.descend(programme, goal, reached.u, Settings()).cost))
     assert costs[0] == pytest.approx(costs[1], rel=1e-6)
+
+
+def test_to_reach_alone_is_an_objective_too() -> None:
+    su2 = lc.group("su2")
+    plan = lc.steer(su2, 1j * HADAMARD, ("sx", "sy"), 6.0, method="direct", objective="none", **QUBIT)
+    assert plan.error < 1e-9
+    assert plan.details["objective"] == "none"
+    assert plan.cost > 2.89735

@@ -53,7 +53,7 @@ class _Programme(ctypes.Structure):
         *[
             (name, ctypes.c_int)
             for name in (
-                "exponentials", "slots", "rows", "entry_lanes", "free_phase", "fuel", "reach_iterations", "descend_iterations",
+                "exponentials", "slots", "rows", "entry_lanes", "free_phase", "fuel", "reach_iterations", "descend_iterations", "wanted",
             )
         ],
         *[(name, ctypes.c_double) for name in ("enough", "damping", "relative")],
@@ -135,6 +135,7 @@ class CompiledSearch:
             fuel=int(settings.fuel),
             reach_iterations=settings.reach_iterations,
             descend_iterations=settings.descend_iterations,
+            wanted=settings.wanted,
             enough=settings.enough,
             damping=settings.damping,
             relative=settings.relative,

@@ -67,7 +67,9 @@ class NumpySearch:
         """See `Machine`."""
         box = _Box.of(programme)
         at = _at(programme, goal, np.clip(u.reshape(len(u), -1), box.low, box.high))
-        used = _arrive(programme, goal, box, at, settings.reach_iterations, settings.enough, settings.damping)
+        used = _arrive(
+            programme, goal, box, at, settings.reach_iterations, settings.enough, settings.damping, settings.wanted
+        )
         return Reached(at.u.reshape(u.shape), at.size, box.objective(settings.fuel, at.u), np.zeros_like(at.r), used)
 
     def descend(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
@@ -86,7 +88,7 @@ class NumpySearch:
             v, multipliers = _proximal(box, settings.fuel, here, y[act], rho[act])
             part, aim = chosen(programme, goal, act)
             trial = _at(part, aim, v)
-            _arrive(part, aim, box, trial, 12, settings.enough, 1e-9)
+            _arrive(part, aim, box, trial, 12, settings.enough, 1e-9, len(act) + 1)
             cost = box.objective(settings.fuel, trial.u)
             better = (trial.size < enough) & (cost < best[act])
             small = better & (best[act] - cost <= settings.relative * best[act])
@@ -105,14 +107,14 @@ def _at(p: Programme, goal: Goal, u: Array) -> _Lanes:
 
 
 def _arrive(
-    p: Programme, goal: Goal, box: _Box, at: _Lanes, iterations: int, enough: float, damping: float
+    p: Programme, goal: Goal, box: _Box, at: _Lanes, iterations: int, enough: float, damping: float, wanted: int
 ) -> NDArray[np.int_]:
     """Damped steps of all lanes towards the goal, in place; steps taken by each."""
     damped = np.full(len(at.u), damping)
     used = np.zeros(len(at.u), int)
     for _ in range(iterations):
         act = np.flatnonzero((at.size > enough) & (damped < _MOST))
-        if not len(act):
+        if not len(act) or np.sum(at.size <= enough) >= wanted:
             break
         here = _Lanes(at.u[act], at.size[act], at.r[act], at.J[act])
         part, aim = chosen(p, goal, act)

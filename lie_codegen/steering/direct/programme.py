@@ -72,6 +72,7 @@ class Settings:
         reach_iterations, descend_iterations: most steps of a lane in each stage.
         enough: residual at which a lane has arrived.
         damping: of the first step towards the goal, relative to the mean of the normal matrix.
+        wanted: lanes, of those that run side by side, that must arrive before the others are left where they are.
         relative: gain of the objective, relative to it, below which a lane is done.
     """
 
@@ -81,6 +82,7 @@ class Settings:
     enough: float = 1e-12
     damping: float = 1e-2
     relative: float = 1e-8
+    wanted: int = 1000
 
 
 @dataclass(frozen=True, eq=False)

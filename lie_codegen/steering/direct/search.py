@@ -84,7 +84,7 @@ def search(
     total = 0
     variants = len(task.end.values)
     for round_ in range(budget.rounds):
-        lanes = max(budget.starts, variants * _EACH)
+        lanes = max(budget.starts, variants * (_EACH if settings.descend_iterations else 1))
         u = starts(task, budget.pieces, lanes, budget.seed, round_)
         if guesses is not None and round_ == 0:
             u = np.concatenate([guesses, u])
@@ -96,7 +96,7 @@ def search(
         tried.append(f"round {round_ + 1}, seed {budget.seed}: {int(np.sum(there))} of {len(u)} starts reach the goal")
         say(tried[-1])
         kept.append((found.u, found.size, variant))
-        if sum(int(np.sum(size <= enough)) for _, size, _ in kept) >= min(_PLENTY, budget.starts):
+        if sum(int(np.sum(size <= enough)) for _, size, _ in kept) >= min(_PLENTY, budget.starts, settings.wanted):
             break
     u, size, variant = (np.concatenate(each) for each in zip(*kept, strict=True))
     arrived = np.flatnonzero(size <= enough)
@@ -108,6 +108,13 @@ def search(
         # a descent takes seconds there: from the cheapest alone, as many as run side by side
         effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2))
         arrived = arrived[np.argsort(effort, kind="stable")[:_SIDE_BY_SIDE]]
+    if settings.descend_iterations == 0:
+        effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2)) / 2
+        best = int(np.argmin(effort))
+        lane = arrived[best]
+        return Found(
+            u[lane], int(variant[lane]), float(size[lane]), True, float(effort[best]), total, reached, 1, tuple(tried)
+        )
     lower = machine.descend(programme, task.goal(variant[arrived]), u[arrived], settings)
     say(f"descent from {len(arrived)} starts: {int(np.max(lower.used))} steps at most")
     return _best(lower, variant[arrived], total, reached, tuple(tried))
