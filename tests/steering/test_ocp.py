@@ -420,3 +420,57 @@ def test_bad_values_are_refused_by_name() -> None:
 def test_a_bounded_control_without_a_cost_is_bang_bang_and_said_to_be() -> None:
     with pytest.warns(AssumptionWarning, match="bang-bang"):
         lc.ocp(SO3, **{**BASE, "stage_cost": "3 - tr(X)", "bounds": 1.0})
+
+
+def test_a_free_duration_is_found_and_its_derivatives_are_right() -> None:
+    """int (w + |u|^2/2) dt to an attitude of angle a: V(T) = w T + a^2/(2T), so T = a/sqrt(2w), V = a sqrt(2w)."""
+    problem = lc.ocp(
+        SO3, controls=SO3.labels, duration=(0.1, 20.0), intervals=8, stage_cost="w + norm2(u)/2", target="Xd",
+        parameters={"w": ()}, name="hurry",
+    )  # fmt: skip
+    angle = 1.3
+    plan = problem.solve(Xd=rotation((0, angle, 0)), w=0.7)
+    assert plan.duration == pytest.approx(angle / np.sqrt(1.4), rel=1e-7)
+    assert plan.cost == pytest.approx(angle * np.sqrt(1.4), rel=1e-9)
+    np.testing.assert_allclose(plan.t, np.linspace(0, plan.duration, 9))
+    np.testing.assert_allclose(plan.u[:, 1], np.sqrt(1.4), atol=1e-6)  # |u| = sqrt(2 w)
+    np.testing.assert_allclose(plan.sensitivity("w")[:, 1], 1 / np.sqrt(1.4), atol=1e-4)
+    short = lc.ocp(
+        SO3, controls=SO3.labels, duration=(0.1, 0.5), intervals=8, stage_cost="0.7 + norm2(u)/2", target="Xd", name="short_time"
+    ).solve(Xd=rotation((0, angle, 0)))  # fmt: skip
+    assert short.duration == pytest.approx(0.5)
+    late = lc.ocp(
+        SO3, controls=("w2",), duration=(0.1, 20.0), intervals=8, stage_cost="10 + norm2(u)/2", target="Xd", bounds=1.0,
+        name="bounded_time",
+    ).solve(Xd=rotation((0, angle, 0)))  # fmt: skip
+    assert late.duration == pytest.approx(angle, rel=1e-3)  # at full rate, 1 rad/s
+    with pytest.raises(InputError, match="constant length"):
+        lc.mpc(problem)
+    with pytest.raises(InputError, match="no range"):
+        lc.ocp(SO3, **{**BASE, "duration": (2, 1)})
+
+
+def test_forces_and_allocation_of_the_second_order_are_those_of_the_equations() -> None:
+    """A satellite on four skew thrusters in a gravity gradient, by DOP853."""
+    inertia = np.array([3.0, 2.0, 1.5])
+    columns = np.array([[1, -1, 1, -1], [1, 1, -1, -1], [1, 1, 1, 1]]) / np.sqrt(3)
+    problem = lc.ocp(
+        SO3, dynamics="second_order", inertia=inertia, drag=0.1, allocation=columns, inputs={"f": 4},
+        force="p*skew(X)*c", stage_cost=("X - Xd", "xi", "0.3*f"), terminal_cost=("3*(X - Xd)", "2*xi"),
+        parameters={"Xd": (3, 3), "p": (), "c": 3}, bounds={"f": (0, 1.5)}, duration=3.0, intervals=60, name="thrusters",
+    )  # fmt: skip
+    c = np.array([0.2, -0.4, 0.3])
+    plan = problem.solve(rotation((0.3, 0.2, 0)), Xd=rotation((0, 0.9, 0.4)), p=0.8, c=c)
+    assert plan.status is Status.SOLVED
+    assert np.min(plan.controls["f"]) >= 0
+    x = np.concatenate([rotation((0.3, 0.2, 0)).ravel(), np.zeros(3)])
+    for f in plan.u:
+
+        def rate(_t: float, x: np.ndarray, f: np.ndarray = f) -> np.ndarray:
+            X, w = x[:9].reshape(3, 3), x[9:]
+            torque = np.cross(inertia * w, w) - 0.1 * w + 0.8 * (X - X.T) / 2 @ c + columns @ f
+            return np.concatenate([(X @ SO3.hat(w)).ravel(), torque / inertia])
+
+        x = solve_ivp(rate, (0, 0.05), x, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(plan.X_final, x[:9].reshape(3, 3), atol=1e-6)
+    np.testing.assert_allclose(plan.states["xi"][-1], x[9:], atol=1e-6)

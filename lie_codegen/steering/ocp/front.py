@@ -37,7 +37,7 @@ Terms = Term | Sequence[Term]
 def ocp(
     group: MatrixGroup | str,
     *,
-    duration: float,
+    duration: float | tuple[float, float],
     intervals: int,
     controls: Sequence[str | int] | None = None,
     inputs: Mapping[str, Any] | None = None,
@@ -72,7 +72,7 @@ def ocp(
 
     Args:
         group: the group, or its name.
-        duration: seconds.
+        duration: seconds; or a pair (shortest, longest): then it is found too, a number T that formulas may use.
         intervals: N.
         controls: labels (or positions) of the actuated basis elements: xi = sum_i u_i A_i + drift; with
             dynamics="second_order" the body forces that the controls are. The input is called u.
@@ -110,7 +110,7 @@ def ocp(
             given[target] = "X"
         terminal = (*_sequence(terminal), f"X - {target}")
     N = _count(intervals, where)
-    T = _duration(duration, where)
+    T, free = _duration(duration, where)
     for what, known, value in (("quadrature", QUADRATURES, quadrature), ("integrator", INTEGRATORS, integrator)):
         if value not in known or value == "exact":
             names = ", ".join(each for each in known if each != "exact")
@@ -118,6 +118,8 @@ def ocp(
     own_inputs, law, own_states, own_rates = _dynamics(
         group, where, dynamics, controls, inputs, states, velocity, rates, drift, inertia, force, drag, allocation
     )
+    if free is not None:
+        own_states, own_rates = {**own_states, "T": ()}, {**own_rates, "T": ("0",)}
     layouts = (layout("input", own_inputs), layout("state", own_states), layout("parameter", given, element))
     check_distinct(layouts, _entries_of(group))
     if layouts[0].size == 0:
@@ -141,6 +143,7 @@ def ocp(
         intervals=N,
         quadrature=quadrature,
         integrator=integrator,
+        free_duration=free,
     )
     check_problem(data, where)
     return OptimalControlProblem(data)
@@ -313,10 +316,17 @@ def _count(intervals: Any, where: str) -> int:
     return int(intervals)
 
 
-def _duration(duration: Any, where: str) -> float:
-    if isinstance(duration, bool) or not isinstance(duration, int | float | np.number) or not 0 < duration < np.inf:
-        raise InputError(f"{where}: duration must be a positive number of seconds, got {duration!r}")
-    return float(duration)
+def _duration(duration: Any, where: str) -> tuple[float, tuple[float, float] | None]:
+    """The duration of the equations, and the bounds of a free one."""
+    ends = duration if isinstance(duration, tuple | list) and len(duration) == 2 else (duration,)
+    for end in ends:
+        if isinstance(end, bool) or not isinstance(end, int | float | np.number) or not 0 < end < np.inf:
+            raise InputError(f"{where}: duration must be a positive number of seconds, or two, got {duration!r}")
+    if len(ends) == 1:
+        return float(ends[0]), None
+    if not ends[0] < ends[1]:
+        raise InputError(f"{where}: duration from {ends[0]:g} to {ends[1]:g} s is no range")
+    return 1.0, (float(ends[0]), float(ends[1]))
 
 
 def _name(name: str | None, group: MatrixGroup) -> str:

@@ -42,6 +42,8 @@ def mpc(problem: OptimalControlProblem, *, iterations: int = 1, penalty: float =
     """
     if not isinstance(problem, OptimalControlProblem):
         raise InputError(f"mpc: expected a problem of lc.ocp, got {problem!r:.60}")
+    if problem.data.free_duration is not None:
+        raise InputError(f"mpc({problem.data.name}): a loop has a horizon of constant length; give lc.ocp one duration")
     if isinstance(iterations, bool) or not isinstance(iterations, int | np.integer) or not 1 <= iterations <= 1000:
         raise InputError(
             f"mpc({problem.data.name}): iterations must be a whole number from 1 to 1000, got {iterations!r}"

@@ -33,6 +33,7 @@ class OptimalPlan:
         iterations, sweeps: of the start that won.
         gain: (N, m, nx) du*/dx, x in local coordinates (eta, z): exact derivatives where curvature is exact; rows of
             controls at a bound are 0.
+        value_gradient: (nx,) first derivative of the optimal cost by the first state, in local coordinates.
         value_hessian: (nx, nx) second derivative of the optimal cost by the first state.
         multipliers, end_multipliers, penalty: of g, of what holds at the end, and rho: a warm start takes them over.
         starts: (starts, 2) cost and violation of every start tried.
@@ -54,6 +55,7 @@ class OptimalPlan:
     iterations: int
     sweeps: int
     gain: Array = field(repr=False)
+    value_gradient: Array = field(repr=False)
     value_hessian: Array = field(repr=False)
     multipliers: Array = field(repr=False)
     end_multipliers: Array = field(repr=False)
@@ -86,8 +88,8 @@ class OptimalPlan:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
-        return self.problem.duration
+        """Seconds; what was found where the duration is free."""
+        return float(self.t[-1])
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, OptimalPlan):

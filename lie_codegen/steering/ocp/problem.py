@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.end import end_error
+from lie_codegen.steering.ocp.free_duration import best_duration
 from lie_codegen.steering.ocp.machine import machine_of
 from lie_codegen.steering.ocp.machine_base import EXACT_AT_ONCE, GAUSS_NEWTON, Machine
 from lie_codegen.steering.ocp.plan import OptimalPlan
@@ -32,6 +33,19 @@ _PENALTY = 10.0
 _OUTER = 25
 #: Further starts where none of those asked for is admissible.
 _MORE = 8
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The options of `solve`."""
+
+    starts: int
+    seed: int
+    threads: int | None
+    tolerance: float
+    allowed: float
+    iterations: int
+    curvature: bool
 
 
 @dataclass(frozen=True)
@@ -94,28 +108,44 @@ class OptimalControlProblem:
             InputError, ShapeError, NotFiniteError, NotOnGroupError: naming the culprit.
         """
         where = f"{self.data.name}.solve"
-        x0, rows = self.start(X0, values, where)
         count = _at_least_one(starts, "starts", where)
+        free = self.data.free_duration
+        search = _Search(count, seed, threads, tolerance, allowed, iterations, curvature)
+        if free is None:
+            x0, rows = self.start(X0, values, where)
+            return self._search(x0, rows, guess, search, where)
+        first = guess.duration if isinstance(guess, OptimalPlan) else float(np.sqrt(free[0] * free[1]))
+        x0, rows = self.start(X0, {**values, "T": first}, where)
+
+        def at(T: float, near: Any) -> OptimalPlan:
+            x0[-1] = T
+            again = search if near is guess else replace(search, starts=1)
+            return self._search(x0, rows, near, again, where)
+
+        return best_duration(at, first, free, guess)
+
+    def _search(self, x0: Array, rows: Array, guess: Any, search: _Search, where: str) -> OptimalPlan:
+        """The best of several starts."""
         first = self._guess(guess, where)
-        machine = self.machine(second_order=curvature)
+        machine = self.machine(second_order=search.curvature)
         began = time.perf_counter()
 
         def run(number: int) -> Array:
-            space = self._workspace(machine, x0, rows, first, guess, number, seed, curvature)
-            machine.solve(space, rows, 0.0, tolerance, allowed, _OUTER, iterations)
+            space = self._workspace(machine, x0, rows, first, guess, number, search)
+            machine.solve(space, rows, 0.0, search.tolerance, search.allowed, _OUTER, search.iterations)
             return space
 
-        lanes = threads if threads is not None else os.cpu_count() or 1
-        spaces = _in_lanes(run, range(count), lanes if machine.compiled else 1)
+        lanes = search.threads if search.threads is not None else os.cpu_count() or 1
+        spaces = _in_lanes(run, range(search.starts), lanes if machine.compiled else 1)
         best = min(spaces, key=_rank)
         if _rank(best)[0] > 0:
             # one start may be caught in a corner between conditions: others are tried before it is said that none was found
-            spaces += _in_lanes(run, range(count, count + _MORE), lanes if machine.compiled else 1)
+            spaces += _in_lanes(run, range(search.starts, search.starts + _MORE), lanes if machine.compiled else 1)
             best = min(spaces, key=_rank)
         if int(best["status"][0]) < 3:
             kept = best.copy()
             machine.gains(kept, rows, 0.0)
-            best["K"], best["P"] = kept["K"], kept["P"]
+            best["K"], best["P"], best["v"] = kept["K"], kept["P"], kept["v"]
         tried = np.array([[space["cost"][0], space["violation"][0]] for space in spaces])
         return self.plan(machine, best, rows, tried, time.perf_counter() - began)
 
@@ -124,6 +154,8 @@ class OptimalControlProblem:
         data = self.data
         X = np.eye(data.group.degree) if X0 is None else X0
         element = group_element(data.group, X, f"{where}: X0")
+        if data.free_duration is not None and "T" not in values:
+            values = {**values, "T": data.free_duration[0]}
         states = {name: np.zeros(shape) for name, shape in data.states.shapes}
         states.update({name: value for name, value in values.items() if name in states})  # type: ignore[misc]
         rest = {name: value for name, value in values.items() if name not in states}
@@ -174,12 +206,11 @@ class OptimalControlProblem:
         first: Array | None,
         guess: Any,
         number: int,
-        seed: int,
-        curvature: bool,
+        search: _Search,
     ) -> Array:
         space = machine.workspace()
         space["x"][0, 0] = x0
-        space["rho"], space["curvature"] = _PENALTY, int(curvature)
+        space["rho"], space["curvature"] = _PENALTY, int(search.curvature)
         if first is None:
             machine.first_guess(space, rows, 0.0)
         else:
@@ -187,9 +218,9 @@ class OptimalControlProblem:
         if isinstance(guess, OptimalPlan) and number == 0 and guess.multipliers.shape == space["lambda"][0].shape:
             space["lambda"][0], space["lambda_end"][0] = guess.multipliers, guess.end_multipliers
             space["rho"] = guess.penalty
-            space["curvature"] = EXACT_AT_ONCE if curvature else GAUSS_NEWTON
+            space["curvature"] = EXACT_AT_ONCE if search.curvature else GAUSS_NEWTON
         if number:
-            noise = np.random.default_rng((seed, number)).normal(size=space["u"][0].shape)
+            noise = np.random.default_rng((search.seed, number)).normal(size=space["u"][0].shape)
             space["u"][0] += _SPREAD * noise
         return space
 
@@ -199,13 +230,13 @@ class OptimalControlProblem:
         x = record["x"].copy()
         X, z = unpack_elements(data, x)
         worst = self._worst(machine, int(record["worst"]), int(record["worst_stage"]), float(record["violation"]))
-        h = data.duration / data.intervals
+        duration = data.duration if data.free_duration is None else float(z[0, -1])
         return OptimalPlan(
             problem=data,
-            t=h * np.arange(data.intervals + 1),
+            t=duration / data.intervals * np.arange(data.intervals + 1),
             X=X,
             z=z,
-            u=StageControls(record["u"], data.duration),
+            u=StageControls(record["u"], duration),
             cost=float(record["cost"]),
             violation=float(record["violation"]),
             worst=worst,
@@ -214,6 +245,7 @@ class OptimalControlProblem:
             iterations=int(record["iterations"]),
             sweeps=int(record["sweeps"]),
             gain=record["K"].copy(),
+            value_gradient=record["v"].copy(),
             value_hessian=record["P"].copy(),
             multipliers=record["lambda"].copy(),
             end_multipliers=record["lambda_end"].copy(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -87,7 +87,11 @@ class Cost:
 
 @dataclass(frozen=True)
 class ProblemData:
-    """min sum l + phi subject to X' = X hat(xi), z' = f, lower <= u <= upper, g <= 0, e = 0."""
+    """min sum l + phi subject to X' = X hat(xi), z' = f, lower <= u <= upper, g <= 0, e = 0.
+
+    Where the duration is free, between two bounds, it is a state T that does not move, the time of the equations runs from 0 to
+    1 (`duration`), and xi, f, l and t are multiplied by T.
+    """
 
     name: str
     group: MatrixGroup
@@ -106,6 +110,7 @@ class ProblemData:
     intervals: int
     quadrature: str
     integrator: str
+    free_duration: tuple[float, float] | None = None
 
     @property
     def scope(self) -> Scope:
@@ -128,6 +133,18 @@ class ProblemData:
         return INTEGRATORS["exact" if self.is_invariant else self.integrator]
 
     def xi(self, at: Point) -> Vector:
+        """(n,) body velocity, by the time of the equations."""
+        return scaled(self._scale(at), self._velocity(self._in_seconds(at)))
+
+    def _scale(self, at: Point) -> Any:
+        """T, or 1."""
+        return 1 if self.free_duration is None else at.values["state"][self.states.slices()["T"][0]][0]
+
+    def _in_seconds(self, at: Point) -> Point:
+        """The point with the time that formulas know."""
+        return at if self.free_duration is None else replace(at, t=self._scale(at) * at.t)
+
+    def _velocity(self, at: Point) -> Vector:
         """(n,) body velocity."""
         if isinstance(self.velocity, Affine):
             moved = matvec(_constants(self.velocity.columns), at.values["input"])
@@ -138,16 +155,17 @@ class ProblemData:
 
     def rate(self, at: Point) -> Vector:
         """(q,) rates of the states, in their order."""
+        scale, at = self._scale(at), self._in_seconds(at)
         by_name: dict[str, Vector] = {
             name: [entry for term in terms for entry in self.scope.evaluate(term, at, "any", f"rates of {name}")]
             for name, terms in self.rates
         }
         if isinstance(self.velocity, SecondOrder):
             by_name["xi"] = self._acceleration(self.velocity, at)
-        return [entry for name in self.states.names for entry in by_name[name]]
+        return scaled(scale, [entry for name in self.states.names for entry in by_name[name]])
 
     def _acceleration(self, law: SecondOrder, at: Point) -> Vector:
-        xi = self.xi(at)
+        xi = self._velocity(at)
         total = ad_star(at.ops, self.group.algebra, xi, matvec(_constants(law.inertia), xi))
         total = plus(total, matvec(_constants(law.columns), at.values["input"]))
         total = plus(total, scaled(-1, matvec(_constants(law.drag), xi)))
@@ -158,6 +176,8 @@ class ProblemData:
     def cost(self, parts: tuple[Cost, ...], at: Point, where: str) -> tuple[Any, Vector]:
         """The scalar parts' sum, and all residuals; the whole cost is the sum plus half the residuals' square."""
         scope = self.scope if "input" in at.values else self.end_scope
+        scale = self._scale(at) if "input" in at.values else 1  # a stage's cost is paid for as long as the stage lasts
+        at = self._in_seconds(at)
         total: Any = 0
         residual: Vector = []
         for part in parts:
@@ -166,11 +186,14 @@ class ProblemData:
                 residual += entries
             else:
                 total = total + entries[0]
-        return total, residual
+        if isinstance(scale, int):
+            return total, residual
+        return scale * total, scaled(at.ops.sqrt(scale), residual)
 
     def rows(self, conditions: tuple[Condition, ...], at: Point) -> Vector:
         """Entries of conditions, one after the other."""
         scope = self.scope if "input" in at.values else self.end_scope
+        at = self._in_seconds(at)
         kinds = {"g": "any", "e": "parts"}  # a complex entry is zero when its parts are; it is not below zero
         return [entry for each in conditions for entry in scope.evaluate(each.term, at, kinds[each.sense], each.name)]
 

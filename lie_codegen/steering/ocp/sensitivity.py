@@ -35,9 +35,18 @@ _WEAK = 1e-6
 def state_sensitivity(plan: Solution) -> Array:
     """(N, m, nx) du*/dx_0."""
     data = plan.problem
-    n = data.group.dim
-    nx = n + data.states.size
-    return _forward(data, plan, plan.gain, np.eye(nx), np.zeros((0, nx)))
+    nx = data.group.dim + data.states.size
+    first = np.eye(nx)
+    if data.free_duration is not None:
+        first[-1] = -plan.value_hessian[-1] / plan.value_hessian[-1, -1] if _is_inside(plan) else 0.0
+        first[-1, -1] = 0.0  # the duration is no state to be displaced: it follows
+    return _forward(data, plan, plan.gain, first, np.zeros((0, nx)))
+
+
+def _is_inside(plan: Solution) -> bool:
+    """Whether a free duration lies between its bounds."""
+    low, high = plan.problem.free_duration or (0.0, 0.0)
+    return bool(low < plan.z[0, -1] < high)
 
 
 def sensitivity(plan: Solution, name: str) -> Array:
@@ -78,6 +87,9 @@ def sensitivity(plan: Solution, name: str) -> Array:
     gain = space["K"][0]
     nx, size = plan.gain.shape[2], prod(shape)
     first = np.zeros((nx, size))
+    if data.free_duration is not None and _is_inside(plan):
+        P = space["P"][0]
+        first[-1] = -P[nx - 1, nx:] / P[nx - 1, nx - 1]  # the duration follows, so that dV/dT stays 0
     return _forward(data, plan, gain, first, np.eye(size), extended).reshape(*plan.u.shape, *shape)
 
 

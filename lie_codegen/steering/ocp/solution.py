@@ -30,6 +30,9 @@ class Solution(Protocol):
     def gain(self) -> Array: ...
 
     @property
+    def value_hessian(self) -> Array: ...
+
+    @property
     def multipliers(self) -> Array: ...
 
     @property
