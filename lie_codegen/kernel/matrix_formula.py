@@ -7,7 +7,7 @@
     postfix:= atom "'"*                     (transpose)
     atom   := number | name | function '(' sum ')' | '(' sum ')'
 
-tr is the trace, norm2 the sum of squares of all entries, skew(A) = (A - A')/2; a number standing where a matrix is
+tr is the trace, norm2 the sum of squares of all entries (of a number its square), skew(A) = (A - A')/2; a number standing where a matrix is
 needed is that multiple of the identity. X^-1 and Xd^-1 are known; nothing else can be inverted. The text is data,
 never evaluated.
 """
@@ -211,6 +211,8 @@ class _Parser(TokenStream):
         self.expect(")")
         if token.text in ("tr", "norm2", "skew"):
             if not isinstance(argument, sp.MatrixBase):
+                if token.text == "norm2":
+                    return self.square(argument)
                 raise self.error(f"{token.text} takes a matrix", token)
             if token.text == "norm2":
                 return sp.Add(*[self.square(entry) for entry in argument.flat()])
