@@ -9,6 +9,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.direct.front import asks_direct, direct_plan
 from lie_codegen.steering.feedback import feedback
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by
+from lie_codegen.steering.ocp.steered import asks_open, open_plan
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import make_task
 
@@ -31,7 +32,7 @@ def steer(
             `UpToPhase`.
         controls: labels (or positions) of the actuated basis elements; for "direct" also vectors (n,), n formulas of t, functions.
         duration: seconds.
-        method: "auto": "direct" for goal sets, fuel, bounds and drift, "transcription" if another option asks for it (obstacles,
+        method: "auto": "ocp" for costs, constraints or parameters of one's own, "direct" for goal sets, fuel, bounds and drift, "transcription" if another option asks for it (obstacles,
             rates, torques ...), else "optimal";
             "direct": bounds, drift, goal sets, fuel, functions of time: reaches from many starts, then descends;
             "four_phase": closed form, section 5.2 of TR 93-59; two controls; form="single" for its single-exponential design (66);
@@ -40,6 +41,7 @@ def steer(
             "area_rule": Fourier controls of least energy within the averaged model, then retuned to hit the target exactly;
             "loops": a straight part, a loop for each bracket, a figure of eight for each bracket of brackets, in turn, retuned;
             "optimal": minimum energy, exact extremals;
+            "ocp": cost=, terminal_cost=, constraints=, parameters= of one's own, as `lc.ocp` has them, with the target as end;
             "transcription": bounds, rates, obstacles, drift, torques, via points, periodic controls, minimum time;
             "feedback": in steps, each planned from the measured state.
         tolerance: endpoint error |log(target^-1 X)| below which the plan counts as solved.
@@ -52,6 +54,8 @@ def steer(
         InfeasibleError: no controls within the bounds reach the target: proved, see `.certificate`.
         SteeringError: the solver found nothing admissible; says what was tried, `.best` and `.violation`.
     """
+    if asks_open(method, options):
+        return open_plan(group, target, controls, duration, tolerance, **options)
     if asks_direct(method, target, controls, options):
         return direct_plan(group, target, controls, duration, tolerance, options)
     methods = {**OPEN_LOOP, "feedback": feedback}

@@ -1,0 +1,232 @@
+"""lc.steer with costs, constraints or parameters of one's own: the problem of `lc.ocp` with the target as its end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputError
+from lie_codegen.flow.metric import group_element
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.steering.goals import Pointing, Position
+from lie_codegen.steering.ocp.front import ocp
+from lie_codegen.steering.ocp.problem import OptimalControlProblem
+from lie_codegen.steering.ocp.problem_data import Affine
+from lie_codegen.steering.ocp.stage_controls import StageControls
+from lie_codegen.steering.plan import Controls, Plan, Status
+
+Array = NDArray[Any]
+
+#: Options that no other method has.
+_OWN = {"cost", "terminal_cost", "constraints", "parameters"}
+_GOAL = "steer_goal"
+
+
+def asks_open(method: str, options: Mapping[str, Any]) -> bool:
+    """Whether a problem of one's own is meant."""
+    return method == "ocp" or (method == "auto" and any(options.get(name) is not None for name in _OWN))
+
+
+def open_plan(
+    group: MatrixGroup,
+    target: Any,
+    controls: Sequence[Any],
+    duration: Any,
+    tolerance: float = 1e-6,
+    *,
+    cost: Any = None,
+    terminal_cost: Any = None,
+    constraints: Any = (),
+    parameters: Mapping[str, ArrayLike] | None = None,
+    bounds: Any = None,
+    drift: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+    intervals: int = 60,
+    starts: int = 8,
+    seed: int = 0,
+    guess: Any = None,
+    quadrature: str = "trapezoid",
+    integrator: str = "rkmk4",
+) -> Plan:
+    """The cheapest of several starts of a problem of one's own from the identity (or `start`) to the target.
+
+    Args:
+        group, target, controls, duration, tolerance: as `lc.steer`; a pair of durations is searched between. Goals are
+            elements, `Pointing` or `Position`.
+        cost: l of `lc.ocp`, in X, u, t and the parameters; norm2(u) if not given, so that the cost is int |u|^2 dt.
+        terminal_cost, constraints: phi and g of `lc.ocp`.
+        parameters: {name: value} of the formulas.
+        bounds, drift, intervals, quadrature, integrator: as `lc.ocp`.
+        start: (d, d) element to start from.
+        starts, seed, guess: as `solve`; where the target is an element, the exact extremal without bounds is one of the starts.
+
+    Raises:
+        SteeringInputError: a goal or an option that it does not have.
+        SteeringError: nothing admissible was found; says what was tried.
+        Others as `lc.ocp` and `solve`.
+    """
+    group = require_group(group, "steer")
+    own = {name: np.asarray(value) for name, value in dict(parameters or {}).items()}
+    terminal, goal, values = _goal(group, target, own)
+    shapes = tuple((name, "X" if name == _GOAL else value.shape) for name, value in values.items())
+    frozen = [_frozen(each) for each in (cost, terminal_cost, constraints, bounds, drift, duration)]
+    began = time.perf_counter()
+    problem = _problem(
+        group, tuple(controls), *frozen, terminal=terminal, shapes=shapes, intervals=intervals,
+        quadrature=quadrature, integrator=integrator,
+    )  # fmt: skip
+    first = np.eye(group.degree) if start is None else start
+    found = problem.solve(first, guess=guess, starts=starts, seed=seed, **values)
+    steered = (
+        None if guess is not None or goal is None or start is not None else _extremal(problem, goal, found.duration)
+    )
+    if steered is not None:
+        other = problem.solve(first, guess=steered, **values)
+        if other.status in (Status.SOLVED, Status.ADMISSIBLE):
+            worse = found.status not in (Status.SOLVED, Status.ADMISSIBLE) or other.cost < found.cost
+            found = other if worse else found
+    if found.status not in (Status.SOLVED, Status.ADMISSIBLE):
+        what, stage = found.worst or ("the first trajectory", 0)
+        raise SteeringError(
+            f"steer({group.name}): {len(found.starts)} starts found nothing admissible (that none is, is not proved); nearest: "
+            f"{what} at interval {stage} of {intervals} missed by {found.violation:.3g}; try more starts, a longer duration, "
+            f"wider bounds"
+        )
+    law = problem.data.velocity
+    columns = np.array(law.columns) if isinstance(law, Affine) else np.eye(group.dim)
+    velocities = StageControls(np.asarray(found.u) @ columns.T, found.duration)
+    return Plan(
+        group=group,
+        target=found.X_final if goal is None else goal,
+        controls=tuple(group.labels[group.algebra.index(each)] for each in controls),
+        duration=found.duration,
+        method="ocp",
+        u=Controls(velocities, found.t),
+        cost=found.cost,
+        X_final=found.X_final,
+        error=found.error,
+        status=Status.LOCAL if found.error <= tolerance else Status.NOT_CONVERGED,
+        seconds={"solve": time.perf_counter() - began},
+        details={"plan": found, "problem": problem, "inputs": StageControls(found.u, found.duration)},
+    )
+
+
+def _goal(
+    group: MatrixGroup, target: Any, values: dict[str, Any]
+) -> tuple[tuple[str, ...], Array | None, dict[str, Any]]:
+    """The terminal texts, the element if the goal is one, and the parameters with those of the goal."""
+    d = group.degree
+    if isinstance(target, Pointing) and not group.is_complex:
+        axis, direction = np.zeros(d), np.zeros(d)
+        given = np.asarray(target.direction, dtype=float)
+        axis[: len(given)], direction[: len(given)] = np.asarray(target.axis), given / np.linalg.norm(given)
+        axis = axis / np.linalg.norm(axis)
+        return ("X*goal_axis - goal_direction",), None, {**values, "goal_axis": axis, "goal_direction": direction}
+    if isinstance(target, Position) and not group.is_complex:
+        point = np.ones(d)
+        point[: d - 1] = np.asarray(target.point, dtype=float)
+        return ("X*goal_column - goal_point",), None, {**values, "goal_column": np.eye(d)[-1], "goal_point": point}
+    if isinstance(target, Pointing | Position) or not isinstance(target, np.ndarray | list | tuple):
+        raise SteeringInputError(
+            f"steer({group.name}): with costs or constraints of one's own the goal is an element, a Pointing or a Position "
+            f"of a real group; got {type(target).__name__}"
+        )
+    element = group_element(group, target, f"steer({group.name}): target")
+    return (f"X - {_GOAL}",), element, {**values, _GOAL: element}
+
+
+def _frozen(value: Any) -> Any:
+    """Lists, arrays and mappings as tuples, so that a problem is made once."""
+    if isinstance(value, Mapping):
+        return ("mapping", *((name, _frozen(each)) for name, each in value.items()))
+    if isinstance(value, np.ndarray):
+        return ("array", *value.ravel().tolist(), value.shape)
+    if isinstance(value, list | tuple):
+        return ("sequence", *map(_frozen, value))
+    return value
+
+
+def _thawed(value: Any) -> Any:
+    """What `_frozen` was given."""
+    if not isinstance(value, tuple):
+        return value
+    kind, *rest = value
+    if kind == "mapping":
+        return {name: _thawed(each) for name, each in rest}
+    if kind == "array":
+        return np.array(rest[:-1]).reshape(rest[-1])
+    return tuple(map(_thawed, rest))
+
+
+@lru_cache(maxsize=32)
+def _problem(
+    group: MatrixGroup,
+    controls: tuple[Any, ...],
+    cost: Any,
+    terminal_cost: Any,
+    constraints: Any,
+    bounds: Any,
+    drift: Any,
+    duration: Any,
+    *,
+    terminal: tuple[str, ...],
+    shapes: tuple[tuple[str, Any], ...],
+    intervals: int,
+    quadrature: str,
+    integrator: str,
+) -> OptimalControlProblem:
+    """The problem, made once for equal arguments: another target or another value of a parameter builds nothing."""
+    limits = _thawed(bounds)
+    if isinstance(limits, Mapping):
+        limits = _by_label(group, controls, limits)
+    return ocp(
+        group,
+        controls=controls,
+        duration=_thawed(duration),
+        intervals=intervals,
+        stage_cost="norm2(u)" if cost is None else _thawed(cost),
+        terminal_cost=_thawed(terminal_cost),
+        constraints=_thawed(constraints) or (),
+        terminal=terminal,
+        bounds=limits,
+        drift=_thawed(drift),
+        parameters=dict(shapes),
+        quadrature=quadrature,
+        integrator=integrator,
+        name=f"{group.name}_steered",
+    )
+
+
+def _by_label(group: MatrixGroup, controls: tuple[Any, ...], limits: Mapping[Any, Any]) -> Any:
+    """Bounds by label, as lc.steer has them, as arrays in the order of the controls."""
+    if set(limits) == {"u"}:
+        return limits
+    labels = [group.labels[group.algebra.index(each)] for each in controls]
+    low, high = np.full(len(labels), -np.inf), np.full(len(labels), np.inf)
+    for label, limit in limits.items():
+        name = group.labels[group.algebra.index(label)]
+        if name not in labels:
+            raise SteeringInputError(f"steer({group.name}): bounds of {label!r}, which is no control")
+        pair = limit if isinstance(limit, tuple | list) else (-limit, limit)
+        low[labels.index(name)], high[labels.index(name)] = pair
+    return low, high
+
+
+def _extremal(problem: OptimalControlProblem, goal: Array, duration: float) -> Plan | None:
+    """The exact extremal of least energy without bounds, as a first guess; None where there is none."""
+    from lie_codegen.steering.optimal import optimal
+    from lie_codegen.steering.task import make_task
+
+    law = problem.data.velocity
+    if not isinstance(law, Affine) or any(law.drift):
+        return None
+    controls = [int(np.flatnonzero(column)[0]) for column in np.array(law.columns).T]
+    try:
+        return optimal(make_task(problem.data.group, goal, controls, duration, 1e-6))
+    except LieCodegenError:
+        return None
