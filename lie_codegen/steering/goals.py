@@ -20,7 +20,8 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 Array = NDArray[Any]
 Numbers = tuple[Any, ...]
 
-_UNITARY = 1e-8
+#: A gate that is nearer to a unitary one (printed with a few digits) counts as that one.
+_UNITARY = 1e-5
 
 
 @dataclass(frozen=True)
@@ -222,9 +223,14 @@ def _up_to_phase(group: MatrixGroup, goal: UpToPhase, where: str) -> End:
         )
     if gate.shape != (d, d):
         raise ShapeError(f"{where}: UpToPhase holds a matrix of shape {gate.shape}; give ({d}, {d})")
-    off = float(np.max(np.abs(gate.conj().T @ gate - np.eye(d))))
+    # the nearest unitary matrix is the unitary factor of the polar form
+    left, sizes, right = np.linalg.svd(gate)
+    off = float(np.max(np.abs(sizes - 1)))
     if off > _UNITARY:
-        raise NotOnGroupError(f"{where}: UpToPhase needs a unitary matrix; U^H U differs from I by {off:.2g}")
+        raise NotOnGroupError(
+            f"{where}: UpToPhase needs a unitary matrix; the singular values of the one given differ from 1 by {off:.2g}"
+        )
+    gate = left @ right
     whole = group.project(1j * np.eye(d))
     if np.allclose(group.hat(whole), 1j * np.eye(d), atol=1e-12):
         return _element_end(group, gate[None], none, whole[None])

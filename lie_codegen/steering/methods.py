@@ -35,17 +35,26 @@ def plan_by(methods: Mapping[str, Method], method: str, task: Task, options: Map
     Raises:
         SteeringInputError: an unknown method or option.
     """
+    return solver_of(methods, method, options)(task, **options)
+
+
+def solver_of(methods: Mapping[str, Method], method: str, options: Mapping[str, Any]) -> Method:
+    """The method of that name, which has these options.
+
+    Raises:
+        SteeringInputError: an unknown method or option.
+    """
     if method == "auto":
         method = "transcription" if set(options) - _options_of(optimal) else "optimal"
     solver = methods.get(method)
     if solver is None:
-        raise SteeringInputError(f"no method {method!r}; there are auto, {', '.join(sorted(methods))}")
+        raise SteeringInputError(f"no method {method!r}; there are auto, {', '.join(sorted([*methods, 'direct']))}")
     known = _options_of(solver)
     unknown = sorted(set(options) - known)
     if unknown:
         has = ", ".join(sorted(known)) or "none"
         raise SteeringInputError(f"{method} has no option {', '.join(unknown)}; it has {has}")
-    return solver(task, **options)
+    return solver
 
 
 def _options_of(solver: Method) -> set[str]:

@@ -20,7 +20,7 @@ class Status(Enum):
 
     SOLVED = "solved: the endpoint error is below the tolerance"
     APPROXIMATE = "approximate: the method reaches the target up to its own order; see .error"
-    LOCAL = "solved: a local minimum of the energy, the best of the starts tried; more starts may find a better one"
+    LOCAL = "solved: a local minimum of the objective, the best of the starts tried; more starts may find a better one"
     NOT_FOUND = "not found: the nearest of the starts tried, see .violation; that none exists is not proved"
     NOT_CONVERGED = "not converged: the best found is returned, see .error; more starts may find more"
 

@@ -15,7 +15,7 @@ from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.plan import Plan
 
 #: Options that no other method has.
-_OWN = {"start", "equation", "guess", "spread", "rounds", "pieces", "iterations", "seed", "polish"}
+_OWN = {"equation", "spread", "rounds", "pieces", "iterations", "seed", "polish"}
 #: Options with which "auto" is surer by reaching first.
 _SURER = {"bounds", "drift"}
 
@@ -26,6 +26,8 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
         return method == "direct"
     given = {name for name, value in options.items() if value is not None}
     if isinstance(target, GoalSet) or given & _OWN or options.get("objective") == "fuel":
+        return True
+    if given & {"start", "guess"} and given <= _options():
         return True
     if any(not isinstance(each, str | int | np.integer) for each in controls) or callable(options.get("drift")):
         return True

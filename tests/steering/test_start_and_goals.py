@@ -1,0 +1,75 @@
+"""start= for obstacles, gates printed with a few digits, goal sets asked of other methods, feedback that survives what is left."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+import lie_codegen as lc
+
+
+def test_obstacles_stay_in_space_when_the_start_moves() -> None:
+    se2 = lc.group("se2")
+    start, goal = expm(se2.hat([0.7, 0, 0])), np.eye(3)
+    start[:2, 2], goal[:2, 2] = [1, -1], [3.5, 0.8]
+    plan = lc.steer(se2, goal, ("omega", "vx"), 4.0, obstacles=[lc.Ball((2.0, 0.0), 0.5)], start=start)
+    np.testing.assert_allclose(plan.X_final, goal, atol=1e-6)
+    np.testing.assert_allclose(plan.target, goal, atol=1e-12)
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        return (x.reshape(3, 3) @ se2.hat(plan.u(min(max(t, 0.0), 4.0)))).ravel()
+
+    run = solve_ivp(rate, (0, 4), start.ravel(), rtol=1e-9, atol=1e-9, max_step=0.02)
+    np.testing.assert_allclose(run.y[:, -1].reshape(3, 3), goal, atol=2e-6)
+    assert np.min(np.hypot(run.y[2] - 2, run.y[5])) > 0.5 - 1e-5
+
+
+def test_a_start_without_obstacles_is_a_geodesic_where_all_is_actuated() -> None:
+    so3 = lc.group("so3")
+    start, goal = expm(so3.hat([0.3, 0.2, -0.5])), expm(so3.hat([0, 0, 2.5]))
+    plan = lc.steer(so3, goal, ("w1", "w2", "w3"), 1.0, start=start)
+    turn = np.arccos((np.trace(start.T @ goal) - 1) / 2)
+    assert plan.cost == pytest.approx(turn**2, rel=1e-6)
+
+
+def test_gates_of_seven_digits_are_taken_for_the_unitary_ones() -> None:
+    su2 = lc.group("su2")
+    gate = np.round(np.array([[1, 1], [1, -1]]) / np.sqrt(2), 7)
+    plan = lc.steer(su2, lc.UpToPhase(gate), ("sx", "sy"), 6.0, drift=[0, 0, 1], bounds=1)
+    assert plan.error < 1e-9
+    with pytest.raises(lc.errors.NotOnGroupError, match="singular values"):
+        lc.steer(su2, lc.UpToPhase(np.round(gate, 1)), ("sx", "sy"), 6.0, drift=[0, 0, 1], bounds=1)
+
+
+def test_sets_of_goals_are_refused_by_methods_for_elements() -> None:
+    with pytest.raises(lc.errors.SteeringInputError, match="set of goals"):
+        lc.steer(lc.group("se2"), lc.Position((0, 1)), ("omega", "vx"), 1.0, method="optimal")
+    with pytest.raises(lc.errors.SteeringInputError, match="Position"):
+        lc.steer(lc.group("so3"), lc.Position((0, 1)), ("w1", "w2"), 1.0)
+    with pytest.raises(lc.errors.ShapeError, match="Pointing"):
+        lc.steer(lc.group("so3"), lc.Pointing((0, 0, 0), (0, 0, 1)), ("w1", "w2"), 1.0)
+    assert lc.Pointing((0, 0, 1), [0, 1, 0]) == lc.Pointing(np.array([0, 0, 1]), (0, 1, 0))
+
+
+@pytest.mark.parametrize("planner", ["four_phase", "swing_twist"])
+def test_feedback_goes_on_where_the_planner_refuses_what_is_left(planner: str) -> None:
+    plan = lc.steer(
+        lc.group("so3"), (0.1, 0.05, 0.08), ("w1", "w2"), 24.0, method="feedback", planner=planner, steps=6, gain=1.02
+    )
+    errors = plan.details["errors"]
+    assert errors[-1] < 1e-8
+    assert all(b < a for a, b in pairwise(errors))
+    with pytest.raises(lc.errors.SteeringInputError, match="no option"):
+        lc.steer(
+            lc.group("so3"),
+            (0.1, 0.05, 0.08),
+            ("w1", "w2"),
+            24.0,
+            method="feedback",
+            step_options={"p": 1},
+            planner=planner,
+        )
