@@ -47,6 +47,7 @@ _FRONT_DOOR = {
     "build": "lie_codegen.groups.build",
     "generate": "lie_codegen.groups.build",
     "simulate": "lie_codegen.flow.simulate",
+    "Event": "lie_codegen.flow.events",
     "steer": "lie_codegen.steering.front",
     "Pointing": "lie_codegen.steering.goals",
     "Position": "lie_codegen.steering.goals",

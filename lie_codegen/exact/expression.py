@@ -4,7 +4,7 @@
     term       := factor (('*' | '/') factor)*
     factor     := ('+' | '-') factor | power
     power      := atom (('^' | '**') factor)?
-    atom       := number | name | function '(' expression (',' expression)* ')' | '(' expression ')'
+    atom       := number | name | name ('[' integer ']')+ | function '(' expression (',' expression)* ')' | '(' expression ')'
 
 Numbers are integers and decimals, taken exactly ("0.1" is 1/10). Names and functions are those the caller
 allows, nothing else: a text is data and is never evaluated as Python nor given to SymPy's parser.
@@ -44,22 +44,34 @@ def parse_number(text: str) -> sp.Expr:
     return sp.expand(value)
 
 
-def parse_expression(text: str, names: Mapping[str, sp.Expr], functions: Mapping[str, Function]) -> sp.Expr:
-    """The SymPy expression a text denotes, built from the given names and functions only.
+def parse_expression(
+    text: str,
+    names: Mapping[str, sp.Expr],
+    functions: Mapping[str, Function],
+    arrays: Mapping[str, Mapping[tuple[int, ...], sp.Expr]] | None = None,
+) -> sp.Expr:
+    """The SymPy expression a text denotes, built from the given names, functions and entries of arrays (X[0][1]) only.
 
     Raises:
         ExpressionError: for a text outside the grammar, with the column (counted from 1).
     """
-    return _Parser(text, names, functions).parse()
+    return _Parser(text, names, functions, arrays or {}).parse()
 
 
 class _Parser(TokenStream):
     """Recursive descent; one instance a text."""
 
-    def __init__(self, text: str, names: Mapping[str, sp.Expr], functions: Mapping[str, Function]) -> None:
-        super().__init__(text, ",")
+    def __init__(
+        self,
+        text: str,
+        names: Mapping[str, sp.Expr],
+        functions: Mapping[str, Function],
+        arrays: Mapping[str, Mapping[tuple[int, ...], sp.Expr]],
+    ) -> None:
+        super().__init__(text, ",[]" if arrays else ",")
         self.names = names
         self.functions = functions
+        self.arrays = arrays
 
     def parse(self) -> sp.Expr:
         if self.token.kind == "end":
@@ -129,8 +141,27 @@ class _Parser(TokenStream):
             return self.call(token, function)
         if token.text in self.names:
             return self.names[token.text]
-        known = ", ".join(sorted(self.names)) or "none"
+        if token.text in self.arrays:
+            return self.entry(token)
+        known = ", ".join(sorted([*self.names, *self.arrays])) or "none"
         raise self.error(f"no name {token.text!r}; known: {known}", token)
+
+    def entry(self, token: Token) -> sp.Expr:
+        """An entry of an array: integers in brackets, as many as it has axes, counted from 0."""
+        entries, place = self.arrays[token.text], []
+        while self.accept("["):
+            number = self.token
+            if number.kind != "number" or not number.text.isdigit():
+                raise self.error("an index is an integer", number)
+            self.index += 1
+            place.append(int(number.text))
+            self.expect("]")
+        if tuple(place) not in entries:
+            last = "".join(f"[{index}]" for index in max(entries))
+            raise self.error(
+                f"no entry {token.text}{''.join(f'[{k}]' for k in place)}; the last is {token.text}{last}", token
+            )
+        return entries[tuple(place)]
 
     def call(self, token: Token, function: Function) -> sp.Expr:
         arguments = [self.expression()]

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
+from lie_codegen.signals.resolved_input import resolve_function
 
 Array = NDArray[np.float64]
 
@@ -66,6 +68,38 @@ def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
         f"simulate({group.name}): u has shape {values.shape}; give a function of t, a constant ({group.dim},), or "
         f"samples ({len(t)}, {group.dim}) at the times t"
     )
+
+
+def as_drive(
+    group: MatrixGroup, signal: Signal, eps: Array, t: Array, *, rtol: float, resolution: float | None
+) -> Drive:
+    """eps u as compiled loops read it: a formula as it is, a function resolved into pieces.
+
+    A fifth of the tolerance is for the pieces.
+
+    Raises:
+        InputError, NotFiniteError, ComputationError: see `resolve_function`.
+    """
+    if signal.formula is not None:
+        return formula_drive(signal.formula, eps)
+    found = resolve_function(
+        signal.evaluate, float(t[0]), float(t[-1]), tolerance=0.2 * rtol / max(float(np.max(np.abs(eps))), 1e-300),
+        resolution=resolution, breakpoints=signal.breakpoints, where=f"simulate({group.name})",
+    )  # fmt: skip
+    return resolved_drive(found, eps)
+
+
+def drive_signal(drive: Drive, t: Array) -> Signal:
+    """The input of one trajectory, for the steps that take a Signal; its jumps are where pieces became too short to count."""
+    if not drive.terms:
+        return _of_formula(drive.formula.scaled(drive.factor[0]), t)
+    widths = np.diff(drive.times)
+    jumps = drive.times[1:][widths < 1e-9 * (t[-1] - t[0])]
+
+    def evaluate(s: Array) -> Array:
+        return drive.values(s, np.zeros_like(s), np.zeros(1))[:, 0]
+
+    return Signal(drive.series.shape[2], evaluate, jumps)
 
 
 def _of_formula(formula: FormulaInput, t: Array) -> Signal:

@@ -1,75 +1,30 @@
-"""lc.simulate: X' = X hat(eps u(t)) on the group, by RKMK4 in compiled loops."""
+"""lc.simulate: X' = X hat(eps u(t)) on the group, by Magnus steps in compiled loops."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError
-from lie_codegen.flow.chart import Samples, follow_chart
-from lie_codegen.flow.grid import Grid, refine, sample
-from lie_codegen.flow.inputs import Signal, as_signal
+from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.flow.events import Event, event_function
+from lie_codegen.flow.events import Function as EventFunction
+from lie_codegen.flow.inputs import Signal, as_drive, as_signal, drive_signal
 from lie_codegen.flow.libraries import step_of
-from lie_codegen.flow.restarts import Chart, restarted_charts
-from lie_codegen.flow.rollout import rollout
+from lie_codegen.flow.magnus.events import run_events
+from lie_codegen.flow.magnus.run import MOST_STEPS, MagnusRun, fixed_run, magnus_run, order_for
+from lie_codegen.flow.refined import refined
+from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 
 Array = NDArray[Any]
 
-#: |h u| and w h (of the fastest sine) that a step may span.
-_LARGEST_STEP, _LARGEST_ANGLE = 0.25, 1.0
-#: Steps that are taken where u is a formula, evaluated in C (some seconds on SO(3)), and where Python is asked for it.
-_MOST_STEPS, _MOST_SAMPLES = 2**26, 2**23
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """A solution of X' = X hat(eps u).
-
-    Attributes:
-        t: (k,) times.
-        X: (k, d, d) group elements, on the group to rounding; (k, N, d, d) of N trajectories.
-        steps: number of integration steps taken.
-        error_estimate: difference to the run with half the steps, over 15 (Richardson).
-        g: (k, n) Wei-Norman coordinates with X = X0 exp(g_1 A_1) ... exp(g_n A_n), from g = 0 at t[0]; raises
-            ChartError, naming the time, if the chart ends on the way.
-        charts: the same with restarts: charts that cover the whole trajectory, see `restarts.Chart`.
-    """
-
-    group: MatrixGroup
-    t: Array
-    X: Array
-    steps: int
-    error_estimate: float
-    _grid: Grid = field(repr=False)
-    _u: Signal = field(repr=False)
-    _eps: Array = field(repr=False)
-
-    @cached_property
-    def g(self) -> Array:
-        """(k, n) Wei-Norman coordinates; see the class."""
-        return follow_chart(self.group, self._grid, self._samples(), self.X)
-
-    @cached_property
-    def charts(self) -> tuple[Chart, ...]:
-        """Wei-Norman charts that cover the trajectory, each restarted before the last one ends."""
-        return restarted_charts(self.group, self._grid, self._samples(), self.X)
-
-    def _samples(self) -> Samples:
-        if self.X.ndim != 3:
-            raise InputError(f"{self.group.name}: coordinates are of one trajectory; simulate it alone")
-        eps = float(self._eps)
-
-        def between(first: int, last: int) -> tuple[Array, Array, Array, Array]:
-            u0, um, u1, h = sample(self._u, self._grid, first, last)
-            return eps * u0, eps * um, eps * u1, h
-
-        return between
+_FOURTH_ORDER = ("rkmk4", "commutator_free")
+METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)
+_DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
 def simulate(
@@ -79,64 +34,134 @@ def simulate(
     t: ArrayLike,
     eps: ArrayLike = 1.0,
     X0: ArrayLike | None = None,
-    tolerance: float = 1e-11,
-    method: str = "rkmk4",
+    rtol: float | None = None,
+    atol: float = 0.0,
+    tolerance: float | None = None,
+    resolution: float | None = None,
+    method: str = "auto",
+    steps: int | None = None,
+    events: Sequence[Event] = (),
     threads: int = 1,
 ) -> Trajectory:
     """The flow X' = X hat(eps u(t)) from X(t[0]) = X0, at the times t; one, or N trajectories at once.
 
+    X(t + h) = X(t) exp(Omega), Omega the Magnus series to order 8 or 6: Blanes, Casas and Ros, BIT 40 (2000) 434, in the
+    left-invariant form (every bracket with the other sign). One trajectory is cut into eight runs of steps that go
+    side by side; many go eight at a time.
+
     Args:
         group: the group.
         u: a PeriodicInput or a SampledInput (evaluated in the compiled loop where it is a Fourier series or straight
-            pieces, however long the run), any u(t) -> (n,) (vectorised or not; an attribute `breakpoints` names the times
-            at which it is not smooth), a constant (n,), or samples (len(t), n), joined by straight lines.
+            pieces, however long the run); a constant (n,); samples (len(t), n), joined by straight lines; a text for each
+            component, a formula of t; or any u(t) -> (n,) (vectorised or not; an attribute `breakpoints` names the times at
+            which it is not smooth), which is read once, finely enough to be known between the values (see `resolution`).
         t: (k,) increasing times; the first is the initial one.
         eps: scales u; (N,) for N trajectories.
         X0: (d, d) initial element, the identity if not given; (N, d, d) for N trajectories.
-        tolerance: the steps are halved until the estimated error is below it (absolute, in the entries of X).
-        method: "rkmk4" (Munthe-Kaas) or "commutator_free" (two exponentials, no brackets: for algebras with many).
-        threads: over which N trajectories are shared out.
+        rtol: the steps are made shorter until the estimated error of the entries of X is below rtol max(1, |X|); 1e-11 if
+            nothing is given, at least 1e-14.
+        atol: the error may also be that large, whatever X is.
+        tolerance: the old name of rtol.
+        resolution: of a function u: the longest gap between two values of it that are read, (t[-1] - t[0])/2000 if not
+            given. No reading sees a pulse between its values: give the width of the shortest.
+        method: "auto" (Magnus of order 8, 6 above rtol = 1e-7), "magnus8", "magnus6", "magnus4", "rkmk4" (Munthe-Kaas) or
+            "commutator_free" (two exponentials, no brackets).
+        steps: so many equal steps, more where they have to end at a time of t or a jump of u; no tolerance then.
+            For the Magnus methods.
+        events: `lc.Event`s to be found along one trajectory.
+        threads: over which N trajectories, or the steps of one, are shared out.
 
     Raises:
         ShapeError, NotFiniteError, InputError: naming the argument.
         NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
-        ComputationError: the tolerance is not reached with the steps that can be taken: 67 million, 8 million for a u
-            that is no formula.
+        ComputationError: the tolerance is not reached with the steps that can be taken: 67 million; or u(t) is not resolved.
     """
     require_group(group, "simulate")
     times = _check_times(group, t)
     factors = _factors(group, eps)
-    if not tolerance > 0:
-        raise InputError(f"simulate({group.name}): tolerance must be positive, got {tolerance}")
+    goal = check_tolerance(f"simulate({group.name})", rtol, atol, tolerance)
+    if method not in METHODS:
+        raise InputError(f"simulate({group.name}): method is one of {', '.join(METHODS)}; given {method!r}")
     start = _initial(group, X0)
-    signal = as_signal(group, u, times)
+    signal = as_signal(group, _input(group, u), times)
     _check_trajectories(group, start, factors, signal)
-    step = step_of(group, method)
-    most = _MOST_SAMPLES if signal.formula is None else _MOST_STEPS
-    grid = Grid.coarse(times, signal.breakpoints)
-    if signal.formula is not None:
-        grid = _divided(grid, signal.formula.fastest * grid.largest_step / _LARGEST_ANGLE, most, group.name)
-    coarse, move = rollout(step, grid, signal, factors, start, group.name, threads)
-    while move > _LARGEST_STEP:
-        grid = _divided(grid, move / _LARGEST_STEP, most, group.name)
-        coarse, move = rollout(step, grid, signal, factors, start, group.name, threads)
-    while True:
-        grid = refine(grid, most, group.name)
-        fine, _ = rollout(step, grid, signal, factors, start, group.name, threads)
-        estimate = float(np.max(np.abs(fine - coarse), initial=0.0)) / 15
-        scale = max(1.0, float(np.max(np.abs(fine))))
-        if not np.isfinite(estimate):
-            raise ComputationError(f"simulate({group.name}): the solution left the range of double precision")
-        if estimate <= max(tolerance * scale, 4e-16 * scale * np.sqrt(grid.steps)):
-            return Trajectory(group, times, fine, grid.steps, estimate, grid, signal, factors)
-        coarse = fine
+    if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
+        raise InputError(f"simulate({group.name}): resolution is {resolution!r}; give a positive length of time")
+    asked = _functions(group, events, signal, factors, start)
+    drive = as_drive(group, signal, factors, times, rtol=goal, resolution=resolution)
+    order = order_for(method, goal)
+    if method in _FOURTH_ORDER:
+        if steps is not None:
+            raise InputError(f"simulate({group.name}): steps go with the Magnus methods; give {method} a tolerance")
+        # A function is read from its pieces here too, so that no method meets an alias of it.
+        read = signal if signal.formula is not None else drive_signal(drive, times)
+        scale = factors if signal.formula is not None else np.ones_like(factors)
+        step = step_of(group, method)
+        X, grid, error = refined(
+            step, read, scale, start, times, rtol=goal, atol=atol, name=group.name, threads=threads
+        )
+        run = MagnusRun(X, 4, 0, grid.steps, grid.largest_step, error + drive.error)
+    elif steps is None:
+        run = magnus_run(group, drive, times, start, order=order, rtol=goal, atol=atol, threads=threads)
+    else:
+        run = fixed_run(group, drive, times, start, order=order, steps=_count(group, steps), threads=threads)
+    X = run.X if method in _FOURTH_ORDER else _with_start(start, run.X)
+    hits = run_events(group, drive, times, start, tuple(events), asked, order, run.longest) if asked else ()
+    return Trajectory(
+        group, times, X, run.steps, run.error_estimate, method if method in _FOURTH_ORDER else f"magnus{order}",
+        drive.evaluations, drive.resolution, hits, drive, goal, run.multiple,
+    )  # fmt: skip
 
 
-def _divided(grid: Grid, ratio: float, most: int, name: str) -> Grid:
-    """Steps shorter by at least the ratio, a power of two."""
-    if ratio <= 1:
-        return grid
-    return refine(grid, most, name, 2 ** int(np.ceil(np.log2(ratio))))
+def _input(group: MatrixGroup, u: Any) -> Any:
+    """Formulas as texts become a function of time, everything else stays."""
+    if not (isinstance(u, list | tuple) and len(u) > 0 and all(isinstance(each, str) for each in u)):
+        return u
+    from lie_codegen.flow.formulas import formula_input
+
+    return formula_input(group, u)
+
+
+def _functions(
+    group: MatrixGroup, events: Sequence[Event], signal: Signal, eps: Array, start: Array
+) -> tuple[EventFunction, ...]:
+    """The events as functions, before anything is integrated."""
+    if not isinstance(events, list | tuple) or not all(isinstance(each, Event) for each in events):
+        raise InputError(f"simulate({group.name}): events is a list of lc.Event, given {events!r:.80}")
+    many = start.ndim == 3 or eps.ndim or (signal.formula is not None and signal.formula.trajectories is not None)
+    if events and many:
+        raise InputError(f"simulate({group.name}): events are of one trajectory; simulate it alone")
+    return tuple(event_function(event, group.degree, group.is_complex) for event in events)
+
+
+def _with_start(start: Array, later: Array) -> Array:
+    """(k, ...) with the initial element in front."""
+    return np.concatenate([np.broadcast_to(start, (1, *later.shape[1:])), later])
+
+
+def check_tolerance(where: str, rtol: float | None, atol: float, tolerance: float | None) -> float:
+    """The one tolerance that was given.
+
+    Raises:
+        InputError: rtol and tolerance together, one below 1e-14 or not finite, a negative atol.
+    """
+    if rtol is not None and tolerance is not None:
+        raise InputError(f"{where}: give rtol, or its old name tolerance, not both")
+    name, value = ("tolerance", tolerance) if tolerance is not None else ("rtol", rtol)
+    goal = _DEFAULT if value is None else value
+    if not (isinstance(goal, int | float | np.floating) and np.isfinite(goal) and goal > 0):
+        raise InputError(f"{where}: {name} must be positive, got {value!r}")
+    if goal < _SMALLEST:
+        raise InputError(f"{where}: {name} = {goal:g} is below {_SMALLEST:g}, which double precision does not reach")
+    if not (np.isfinite(atol) and atol >= 0):
+        raise InputError(f"{where}: atol must not be negative, got {atol!r}")
+    return float(goal)
+
+
+def _count(group: MatrixGroup, steps: Any) -> int:
+    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= MOST_STEPS:
+        raise InputError(f"simulate({group.name}): steps is an integer from 1 to {MOST_STEPS}, given {steps!r}")
+    return int(steps)
 
 
 def _factors(group: MatrixGroup, eps: ArrayLike) -> Array:

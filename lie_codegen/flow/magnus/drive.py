@@ -1,0 +1,108 @@
+"""What drives a Magnus flow: u as a formula, its pieces on a grid, and its fastest rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.runtime.formula_input import FormulaInput
+from lie_codegen.signals.resolved_input import ResolvedInput
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """factor u(t): waves and straight pieces of a FormulaInput, or the Legendre pieces of a function that was resolved.
+
+    Attributes:
+        formula: zero waves and no pieces under a function.
+        series: (m, terms, n) Legendre coefficients on the pieces, or (0, 0, n).
+        times: (m + 1,) ends of the pieces, straight or Legendre; empty without.
+        factor: (1,), or (N,) of N trajectories.
+        many: N, or None where u and its factor are those of one trajectory.
+        resolution: the longest gap between two values of u that were read; 0 for a formula, which is known everywhere.
+        evaluations: how many values of u were read.
+        error: the integral over time of |u - pieces|, estimated.
+        jumps: (j,) times at which u or a derivative jumps; steps end there.
+    """
+
+    formula: FormulaInput
+    series: Array
+    times: Array
+    factor: Array
+    many: int | None
+    resolution: float
+    evaluations: int
+    error: float
+    jumps: Array
+
+    @property
+    def terms(self) -> int:
+        """Number of Legendre coefficients of a piece; 0 under a formula."""
+        return int(self.series.shape[1])
+
+    def values(self, moments: Array, lengths: Array, at: Array) -> Array:
+        """factor u at the fractions `at` of steps: (k, points, n), or (N, k, points, n).
+
+        A step reads the piece in which its middle lies, at both its ends.
+        """
+        if self.terms:
+            piece = self.piece_of(moments + lengths / 2)
+            x = (moments - self.times[piece])[:, None] + lengths[:, None] * at
+            polynomials = np.polynomial.legendre.legvander(2 * x / np.diff(self.times)[piece, None] - 1, self.terms - 1)
+            total = np.einsum("kpj,kji->kpi", polynomials, self.series[piece])
+        else:
+            total = self.formula.values(moments, lengths, at)
+        return np.asarray(total * (self.factor[0] if self.many is None else self.factor[:, None, None, None]))
+
+    def piece_of(self, moments: Array) -> NDArray[np.intp]:
+        """The piece in which each time lies; 0 without pieces."""
+        if not len(self.times):
+            return np.zeros(len(moments), dtype=np.intp)
+        found = np.searchsorted(self.times, moments, side="right") - 1
+        return np.ascontiguousarray(np.clip(found, 0, len(self.times) - 2), dtype=np.intp)
+
+    def density(self, gram: Array, pieces: NDArray[np.intp]) -> Array:
+        """Steps per unit of time that the fastest sine and the size of u ask for, on each of these pieces.
+
+        One radian of the fastest sine, and |h hat(u)| <= 1 in the Frobenius norm: well inside the radius pi in which the
+        Magnus series converges.
+        """
+
+        def size(vectors: Array) -> Array:
+            return np.asarray(np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", vectors, gram, vectors), 0.0)))
+
+        factor = float(np.max(np.abs(self.factor)))
+        waves = np.hypot(size(self.formula.cosines), size(self.formula.sines))
+        total = np.full(len(pieces), float(np.max(np.sum(waves, axis=-1), initial=0.0)))
+        if self.terms:
+            total = total + np.sum(size(self.series), axis=1)[pieces]
+        elif len(self.times):
+            ends = np.maximum(size(self.formula.left), size(self.formula.right))
+            total = total + (ends if ends.ndim == 1 else np.max(ends, axis=0))[pieces]
+        return np.asarray(np.maximum(factor * total, self.formula.fastest))
+
+
+def formula_drive(formula: FormulaInput, factor: Array) -> Drive:
+    """A Fourier series or straight pieces, times a number or (N,) numbers."""
+    row, many = _row(factor)
+    none = np.empty((0, 0, formula.dim))
+    return Drive(formula, none, formula.times, row, formula.trajectories or many, 0.0, 0, 0.0, formula.times)
+
+
+def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
+    """The pieces of a function, times a number or (N,) numbers."""
+    row, many = _row(factor)
+    none, empty = np.empty((0, u.series.shape[-1])), np.empty(0)
+    nothing = FormulaInput(empty, empty, none, none, empty, none, none)
+    error = float(np.max(np.abs(row))) * u.error
+    return Drive(nothing, u.series, u.times, row, many, u.resolution, u.evaluations, error, u.times)
+
+
+def _row(factor: Array) -> tuple[Array, int | None]:
+    values = np.asarray(factor, dtype=float)
+    return np.ascontiguousarray(np.atleast_1d(values)), len(values) if values.ndim else None

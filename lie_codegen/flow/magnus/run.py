@@ -1,0 +1,156 @@
+"""A Magnus flow to a tolerance: its order, its steps, and what is known of its error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import ComputationError
+from lie_codegen.flow.magnus import numpy_steps
+from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.flow.magnus.library import MagnusLibrary, magnus_library
+from lie_codegen.flow.magnus.steps import Steps, plan_steps
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.threads import share_out
+
+Array = NDArray[Any]
+
+#: method -> order.
+ORDERS = {"magnus4": 4, "magnus6": 6, "magnus8": 8}
+MOST_STEPS = 2**26
+#: Steps of one trajectory, and trajectories, below which another thread costs more than it brings.
+_LEAST_STEPS, _LEAST_TRAJECTORIES = 4096, 32
+#: The steps are never made more than so many times shorter at once: far from convergence the estimate says little.
+_LARGEST_LEAP = 8
+
+
+@dataclass(frozen=True, eq=False)
+class MagnusRun:
+    """X at the times after the first; (k, d, d) or (k, N, d, d).
+
+    Attributes:
+        order: 4, 6 or 8.
+        multiple: how many times the coarsest steps were divided.
+        steps: the number of steps.
+        longest: the longest of them.
+        error_estimate: of the entries of X: from the runs with longer steps, and what reading u left out.
+    """
+
+    X: Array
+    order: int
+    multiple: int
+    steps: int
+    longest: float
+    error_estimate: float
+
+
+def order_for(method: str, rtol: float) -> int:
+    """The order: of three further brackets a hundredth of the error is left, so order 6 pays at loose tolerances only."""
+    return ORDERS.get(method, 8 if rtol < 1e-7 else 6)
+
+
+def magnus_run(
+    group: MatrixGroup,
+    drive: Drive,
+    times: Array,
+    X0: Array,
+    *,
+    order: int,
+    rtol: float,
+    atol: float = 0.0,
+    most: int = MOST_STEPS,
+    threads: int = 1,
+) -> MagnusRun:
+    """Steps are made shorter until two runs agree: the error of the finer is their difference over (ratio^order - 1).
+
+    Of the first pair the order is trusted less, 63 is taken for 255: far from convergence the error falls more slowly.
+
+    Raises:
+        ComputationError: the tolerance is not met with `most` steps, or the solution is not finite.
+    """
+    where = f"simulate({group.name})"
+    base = plan_steps(drive, gram_of(group), times, most)
+    if base is None:
+        raise ComputationError(
+            f"{where}: |h u| and the fastest sine ask for more than the {most} steps that are taken; shorten t, or scale u"
+        )
+    before, coarse = 1, _finite(flow(group, drive, base, order, X0, threads), where)
+    multiple, trust = 2, order - 2
+    while True:
+        if base.count * multiple > most:
+            raise ComputationError(
+                f"{where}: {base.count * before} steps do not reach the tolerance, and {base.count * multiple} are more than "
+                f"the {most} that are taken; loosen rtol, shorten t, or name the times at which u is not smooth in an "
+                "attribute `breakpoints` of u"
+            )
+        steps = base.times(multiple)
+        fine = _finite(flow(group, drive, steps, order, X0, threads), where)
+        scale = max(1.0, float(np.max(np.abs(fine))))
+        difference = float(np.max(np.abs(fine - coarse), initial=0.0))
+        estimate = difference / ((multiple / before) ** trust - 1)
+        goal = max(rtol * scale, atol)
+        floor = 4e-16 * scale * np.sqrt(steps.count)
+        if estimate <= max(goal, floor):
+            return MagnusRun(fine, order, multiple, steps.count, steps.longest, estimate + drive.error * scale)
+        # The next run should reach half the goal; it is at least half as fine again, so that the two can be compared.
+        needed = (estimate / max(goal / 2, floor)) ** (1 / order)
+        before, coarse, trust = multiple, fine, order
+        multiple = int(np.ceil(multiple * min(max(needed, 1.5), _LARGEST_LEAP)))
+
+
+def fixed_run(
+    group: MatrixGroup, drive: Drive, times: Array, X0: Array, *, order: int, steps: int, threads: int = 1
+) -> MagnusRun:
+    """So many equal steps between the first and the last time, or the next more that end at every time and jump of u."""
+    planned = plan_steps(drive, np.zeros((group.dim, group.dim)), times, MOST_STEPS)
+    if planned is None:
+        raise ComputationError(f"simulate({group.name}): u is not finite")
+    widths = np.diff(planned.knots)
+    parts = np.maximum(np.ceil(widths / (times[-1] - times[0]) * steps * (1 - 1e-12)), 1).astype(np.intp)
+    chosen = Steps(planned.knots, parts, planned.piece, planned.slot, planned.slots)
+    X = _finite(flow(group, drive, chosen, order, X0, threads), f"simulate({group.name})")
+    return MagnusRun(X, order, 1, chosen.count, chosen.longest, float("nan"))
+
+
+def gram_of(group: MatrixGroup) -> Array:
+    """x' G x = |hat(x)|^2, Frobenius."""
+    flat = np.asarray(group.basis).reshape(group.dim, -1)
+    return np.ascontiguousarray((flat @ np.conj(flat.T)).real)
+
+
+def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, threads: int = 1) -> Array:
+    """X at the slots by one pass over the steps: (slots, d, d), or (slots, N, d, d) where u, its factor or X0 has N."""
+    library = magnus_library(group)
+    many = len(X0) if X0.ndim == 3 else drive.many
+    if library is None:
+        return numpy_steps.flow(group, drive, steps, order, X0)
+    if many is not None:
+        parts = share_out(lambda a, b: library.many(drive, steps, order, X0, a, b), many, threads, _LEAST_TRAJECTORIES)
+        return np.ascontiguousarray(np.moveaxis(np.concatenate(parts), 0, 1))
+    if threads == 1:
+        return library.one(drive, steps, order, X0, 0, steps.count)[0]
+    return _over_time(library, drive, steps, order, X0, threads)
+
+
+def _over_time(library: MagnusLibrary, drive: Drive, steps: Steps, order: int, X0: Array, threads: int) -> Array:
+    """Threads as lanes: each takes a run of steps from the identity; X is multiplied by what came before."""
+    one = np.eye(len(X0), dtype=X0.dtype)
+    runs = share_out(
+        lambda a, b: (library.one(drive, steps, order, one, a, b), a, b), steps.count, threads, _LEAST_STEPS
+    )
+    found, before = np.zeros((steps.slots, *X0.shape), X0.dtype), X0
+    for (X, end), first, last in runs:
+        ends_here = (steps.first[1:] > first) & (steps.first[1:] <= last) & (steps.slot >= 0)
+        mine = steps.slot[ends_here]
+        found[mine] = before @ X[mine]
+        before = before @ end
+    return found
+
+
+def _finite(X: Array, where: str) -> Array:
+    if not np.all(np.isfinite(X)):
+        raise ComputationError(f"{where}: the solution left the range of double precision")
+    return X

@@ -1,0 +1,161 @@
+"""A function of time, resolved once into Legendre pieces, so that loops need not ask Python again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.errors import ComputationError, InputError, NotFiniteError
+
+Array = NDArray[np.float64]
+
+TERMS = 9
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(TERMS)
+#: Two more places at which a piece is checked: no node, and at no rational part of it.
+_CHECKS = np.array([-1 / np.sqrt(2) + 0.01745, np.sqrt(5) / 2 - 0.63397])
+_AT = np.concatenate([_NODES, _CHECKS])
+#: From values at the nodes to coefficients, c_k = (2k + 1)/2 sum_g w_g P_k(x_g) u_g, and from those to the checks.
+_TO_SERIES = ((np.arange(TERMS) + 0.5)[:, None] * np.polynomial.legendre.legvander(_NODES, TERMS - 1).T) * _WEIGHTS
+_TO_CHECKS = np.polynomial.legendre.legvander(_CHECKS, TERMS - 1)
+#: The widest gap between the nodes, of a piece of length 1: a piece is at most this many `resolution`s long.
+WIDEST_GAP = float(np.max(np.diff(_NODES))) / 2
+LONGEST_PIECE = 5.88
+
+_MOST_VALUES = 2**26
+_MOST_PIECES = 2**21
+_BLOCK = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class ResolvedInput:
+    """u(t) as Legendre series of degree 8 on pieces.
+
+    Attributes:
+        times: (m + 1,) ends of the pieces.
+        series: (m, 9, n) coefficients on [-1, 1] of each piece.
+        resolution: the longest gap between two values of u that were read; what is shorter may have been missed.
+        evaluations: how many values were read.
+        error: the integral over time of the distance to u, estimated at two places of each piece that are no nodes.
+    """
+
+    times: Array
+    series: Array
+    resolution: float
+    evaluations: int
+    error: float
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) -> (k, n)."""
+        moments = np.asarray(t, dtype=float)
+        piece = np.clip(np.searchsorted(self.times, moments, side="right") - 1, 0, len(self.times) - 2)
+        x = 2 * (moments - self.times[piece]) / np.diff(self.times)[piece] - 1
+        return np.asarray(np.einsum("kj,kji->ki", np.polynomial.legendre.legvander(x, TERMS - 1), self.series[piece]))
+
+
+def resolve_function(
+    u: Callable[[Array], Array],
+    start: float,
+    end: float,
+    *,
+    tolerance: float,
+    resolution: float | None = None,
+    breakpoints: Array,
+    where: str,
+) -> ResolvedInput:
+    """Pieces, halved until each agrees with u at two further places and its last coefficient is small.
+
+    At a jump or a corner the halving goes on until what is left does not count: it is located to rounding.
+
+    Args:
+        u: (k,) -> (k, n).
+        start, end: the interval.
+        tolerance: of the integral of |u - pieces| over it.
+        resolution: the longest gap between two values that are read; (end - start)/2000 if not given. A pulse that is
+            shorter than that can lie between all values that are read, and nothing can tell.
+        breakpoints: where u is known not to be smooth.
+        where: for messages.
+
+    Raises:
+        InputError: a resolution that is not positive or needs more than 2^26 values, a u that changes when it is asked again.
+        NotFiniteError: u is NaN or infinite; names the time.
+        ComputationError: u is not resolved by two million pieces; names the time.
+    """
+    length = end - start
+    gap = length / 2000 if resolution is None else resolution
+    if not (np.isfinite(gap) and gap > 0):
+        raise InputError(
+            f"{where}: resolution is {resolution!r}; give the longest gap between two values of u, positive"
+        )
+    inside = breakpoints[(breakpoints > start) & (breakpoints < end)]
+    ends = np.unique(np.concatenate([[start], inside, [end]]))
+    counts = np.ceil(np.diff(ends) / (LONGEST_PIECE * gap) * (1 - 1e-12))
+    if not np.sum(counts) * len(_AT) <= _MOST_VALUES:
+        raise InputError(
+            f"{where}: a resolution of {gap:g} over {length:g} needs {np.sum(counts) * len(_AT):.3g} values of u; at most "
+            f"{_MOST_VALUES} are read: give a larger one, or u as a formula"
+        )
+    counts = np.maximum(counts, 1).astype(int)
+    left = np.concatenate([np.linspace(a, b, c + 1)[:-1] for a, b, c in zip(ends[:-1], ends[1:], counts, strict=True)])
+    right = np.append(left[1:], end)
+    _check_repeatable(u, left, right, where)
+    done: list[tuple[Array, Array, Array]] = []
+    evaluations, error, pieces, widest = 0, 0.0, len(left), 0.0
+    while len(left):
+        values = _read(u, left, right, where)
+        evaluations += values.shape[0] * values.shape[1]
+        series = np.einsum("kg,pgi->pki", _TO_SERIES, values[:, :TERMS])
+        missed = np.max(np.abs(_TO_CHECKS @ series - values[:, TERMS:]), axis=(1, 2))
+        good = _is_resolved(series, missed, left, right, tolerance / length, tolerance)
+        done.append((left[good], right[good], series[good]))
+        error += float(np.sum((missed * (right - left))[good]))
+        widest = max(widest, float(np.max((right - left)[good], initial=0.0)))
+        bad_left, bad_right = left[~good], right[~good]
+        middle = bad_left + (bad_right - bad_left) / 2
+        pieces += len(middle)
+        if pieces > _MOST_PIECES:
+            raise ComputationError(
+                f"{where}: u(t) is not resolved near t = {float(bad_left[0]):.9g} by {_MOST_PIECES} pieces: it is noisy there or "
+                "has many corners; give it as samples (lc.SampledInput), name its corners in an attribute `breakpoints`, or "
+                "loosen rtol"
+            )
+        left, right = np.concatenate([bad_left, middle]), np.concatenate([middle, bad_right])
+    lefts, series = np.concatenate([each[0] for each in done]), np.concatenate([each[2] for each in done])
+    order = np.argsort(lefts)
+    times = np.append(lefts[order], end)
+    return ResolvedInput(times, np.ascontiguousarray(series[order]), WIDEST_GAP * widest, evaluations, error)
+
+
+def _is_resolved(
+    series: Array, missed: Array, left: Array, right: Array, rate: float, whole: float
+) -> NDArray[np.bool_]:
+    """Which pieces are good: by their values, to what rounding of u and t allows, or because they are too short to count."""
+    size = np.max(np.abs(series), axis=2)
+    slope = 2 / (right - left) * np.sum(size * np.arange(TERMS) * (np.arange(TERMS) + 1) / 2, axis=1)
+    scale = np.sum(size, axis=1)
+    rounding = 2e-15 * scale + 4.5e-16 * slope * np.maximum(np.abs(left), np.abs(right))
+    allowed = np.maximum(rate, rounding)
+    smooth = (missed <= allowed) & (size[:, -1] <= 30 * allowed)
+    short = (right - left) * np.maximum(missed, size[:, -1]) <= 1e-3 * whole
+    return np.asarray(smooth | short | (right - left <= 8 * np.spacing(np.maximum(np.abs(left), np.abs(right)))))
+
+
+def _read(u: Callable[[Array], Array], left: Array, right: Array, where: str) -> Array:
+    """(pieces, 11, n) values."""
+    moments = (left + right)[:, None] / 2 + (right - left)[:, None] / 2 * _AT
+    flat = moments.ravel()
+    values = np.concatenate([np.asarray(u(flat[k : k + _BLOCK]), dtype=float) for k in range(0, len(flat), _BLOCK)])
+    if not np.all(np.isfinite(values)):
+        bad = flat[np.flatnonzero(~np.all(np.isfinite(values), axis=1))[0]]
+        raise NotFiniteError(f"{where}: u(t) is NaN or infinite at t = {bad:.9g}")
+    return values.reshape(*moments.shape, -1)
+
+
+def _check_repeatable(u: Callable[[Array], Array], left: Array, right: Array, where: str) -> None:
+    first = slice(0, 4)
+    if not np.array_equal(_read(u, left[first], right[first], where), _read(u, left[first], right[first], where)):
+        raise InputError(
+            f"{where}: u(t) changes when it is asked again at the same t; give samples of it (lc.SampledInput)"
+        )

@@ -1,0 +1,210 @@
+/* What drives a step: the generators a_1 .. a_4 of h u(t_middle + s h) = sum_j a_j s^(j - 1), s in [-1/2, 1/2], exactly where u is a formula. */
+#ifndef MAGNUS_INPUT_H
+#define MAGNUS_INPUT_H
+
+/* Strides in doubles from one trajectory to the next; 0 where all share. */
+typedef struct {
+    ptrdiff_t rates, wave_stride;
+    const double *rate, *rate_low;         /* w_f and what rounding left of it */
+    const double *cosines, *sines;         /* rates x DIM */
+    const double *times;                   /* ends of the pieces; NULL without */
+    const double *left, *right;            /* pieces x DIM: at the start and the end of each, straight between */
+    ptrdiff_t line_stride;
+    ptrdiff_t terms;                       /* of Legendre series instead, on [-1, 1] of each piece; 0 without */
+    const double *series;                  /* pieces x terms x DIM */
+    ptrdiff_t nodes, table_stride;
+    const double *table;                   /* steps x nodes x DIM: values at the nodes of every step; NULL without */
+    const double *projection;              /* ORDERS x nodes: from values at nodes to generators, over h */
+    ptrdiff_t tangents, tangent_stride;
+    const double *tangent;                 /* steps x nodes x tangents x DIM: derivatives of the values */
+    const double *factor;                  /* of u */
+    ptrdiff_t factor_stride;
+} Input;
+
+/* Spans between knots, parts[s] equal steps each; `first` are their running sums. */
+typedef struct {
+    ptrdiff_t spans;
+    const double *knots;
+    const ptrdiff_t *parts, *first, *piece, *slot; /* piece of the input; where the state at the end goes, or -1 */
+} Grid;
+
+/* What eight lanes know of u; `waves` and `lines` lie in the workspace. */
+typedef struct {
+    V *cosines, *sines; /* rates x DIM */
+    V *weights;         /* rates x ORDERS: k_1 .. k_4 of w h */
+    V *left, *slope;    /* DIM each */
+    V *series;          /* terms x DIM */
+    V start, width, factor;
+    double h[LANES];    /* of the weights */
+} Source;
+
+/* cos and sin of p + e, e small: p less the nearest multiple of pi/2, in three pieces, then Taylor to 1e-18. */
+static inline void cos_sin(V p, V e, V *c, V *s)
+{
+    const double magic = 6755399441055744.0;
+    const V n = (p * 0.6366197723675814 + magic) - magic;
+    const I k = (I)(n + magic);
+    const V r = (fused(-n, splat(6.123233995736766e-17), fused(-n, splat(1.5707963267948966), p))
+        - n * -1.4973849048591833e-33) + e;
+    const V z = r * r;
+    const V sine = r + r * z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800
+        + z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0 + z * (1.0 / 355687428096000.0))))))));
+    const V cosine = 1.0 + z * (-0.5 + z * (1.0 / 24 + z * (-1.0 / 720 + z * (1.0 / 40320 + z * (-1.0 / 3628800
+        + z * (1.0 / 479001600 + z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0))))))));
+    const I odd = -(k & 1), minus_sine = (k & 2) << 62, minus_cosine = ((k + 1) & 2) << 62;
+    *s = (V)(((odd & (I)cosine) | (~odd & (I)sine)) ^ minus_sine);
+    *c = (V)(((odd & (I)sine) | (~odd & (I)cosine)) ^ minus_cosine);
+}
+
+/* The halves of a Gauss-Legendre rule of 12 points on [-1/2, 1/2]. */
+static const double gauss_node[6] = {0.06261670425573440, 0.18391574949909010, 0.29365897714330870, 0.38495133709715234,
+    0.45205862818523740, 0.49078031712335963};
+static const double gauss_weight[6] = {0.24914704581340277, 0.23349253653835481, 0.20316742672306592, 0.16007832854334623,
+    0.10693932599531843, 0.04717533638651182};
+
+/*
+ * A wave p cos(w h s) + q sin(w h s), s in [-1/2, 1/2], has the generators h (k1 p, k2 q, k3 p, k4 q), exactly: its moments,
+ * not values at nodes. Constants integrate to zero against s^2 - 1/12, so cos - 1 is taken for cos there.
+ */
+static void wave_weights(double angle, double *k)
+{
+    double zeroth = 0.0, first = 0.0, third = 0.0, fourth = 0.0;
+    EACH(j, 6) {
+        const double s = gauss_node[j], w = gauss_weight[j], half = sin(0.5 * angle * s), sine = sin(angle * s);
+        zeroth += w * cos(angle * s);
+        first += w * s * sine;
+        third += w * (s * s - 1.0 / 12) * (-2.0 * half * half);
+        fourth += w * s * (s * s - 0.15) * (sine - angle * s);
+    }
+    k[2] = 180 * third;
+    k[3] = 2800 * fourth;
+    k[0] = zeroth - k[2] / 12;
+    k[1] = 12 * first - 0.15 * k[3];
+}
+
+static void set_weights(const Input *u, Source *source, int lane, double h)
+{
+    if (fabs(source->h[lane] - h) <= 1e-13 * h) { /* of equal spans, rounded */
+        return;
+    }
+    for (ptrdiff_t f = 0; f < u->rates; ++f) {
+        double k[ORDERS];
+        wave_weights(u->rate[f] * h, k);
+        EACH(i, ORDERS) { source->weights[f * ORDERS + i][lane] = k[i]; }
+    }
+    source->h[lane] = h;
+}
+
+/* A lane enters a span. */
+static void enter(const Input *u, const Grid *grid, Source *source, int lane, ptrdiff_t span, double h, ptrdiff_t who)
+{
+    set_weights(u, source, lane, h);
+    if (u->times) {
+        const ptrdiff_t k = grid->piece[span];
+        const double width = u->times[k + 1] - u->times[k];
+        source->start[lane] = u->times[k];
+        source->width[lane] = width;
+        if (u->terms) {
+            for (ptrdiff_t i = 0; i < u->terms * DIM; ++i) {
+                source->series[i][lane] = u->series[k * u->terms * DIM + i];
+            }
+        } else {
+            const double *left = u->left + who * u->line_stride + k * DIM, *right = u->right + who * u->line_stride + k * DIM;
+            EACH(i, DIM) {
+                source->left[i][lane] = left[i];
+                source->slope[i][lane] = right[i] - left[i];
+            }
+        }
+    }
+}
+
+/* Tables of values at the nodes: the generators of eight steps, `table` pointing at each lane's own, `apart` from node to node. */
+static inline void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V a[ORDERS][DIM])
+{
+    for (ptrdiff_t g = 0; g < u->nodes; ++g) {
+        EACH(i, DIM) {
+            const ptrdiff_t at = g * apart + i;
+            const V value = h * (V){table[0][at], table[1][at], table[2][at], table[3][at],
+                table[4][at], table[5][at], table[6][at], table[7][at]};
+            EACH(j, ORDERS) { a[j][i] += u->projection[j * u->nodes + g] * value; }
+        }
+    }
+}
+
+/* Gauss-Legendre of 5 points on [-1/2, 1/2]: exact for the first two generators of a piece of degree 8. */
+static const double five_node[5] = {0.0, 0.26923465505284155, -0.26923465505284155, 0.45308992296933200, -0.45308992296933200};
+static const double five_weight[5] = {0.28444444444444444, 0.23931433524968324, 0.23931433524968324, 0.11846344252809454,
+    0.11846344252809454};
+
+/* The generators of a Legendre series: those of each polynomial from its values at five nodes, times its coefficients. */
+static inline void from_series(const Input *u, const Source *source, V middle, V low, V h, V a[ORDERS][DIM])
+{
+    const V centre = 2.0 * (((middle - source->start) + low) / source->width) - 1.0, reach = 2.0 * h / source->width;
+    V before[5], now[5], x[5];
+    EACH(g, 5) {
+        x[g] = centre + five_node[g] * reach;
+        before[g] = splat(0.0);
+        now[g] = splat(1.0);
+    }
+    for (ptrdiff_t k = 0; k < u->terms; ++k) {
+        V zeroth = splat(0.0), first = splat(0.0), third = splat(0.0), fourth = splat(0.0);
+        EACH(g, 5) {
+            const double s = five_node[g];
+            const V value = five_weight[g] * now[g];
+            const V next = (1.0 / (double)(k + 1)) * ((double)(2 * k + 1) * x[g] * now[g] - (double)k * before[g]);
+            zeroth += value;
+            first += s * value;
+            third += 180 * (s * s - 1.0 / 12) * value;
+            fourth += 2800 * s * (s * s - 0.15) * value;
+            before[g] = now[g];
+            now[g] = next;
+        }
+        EACH(i, DIM) {
+            const V c = h * source->series[k * DIM + i];
+            a[0][i] += c * (zeroth - third * (1.0 / 12));
+            a[1][i] += c * (12.0 * first - 0.15 * fourth);
+            a[2][i] += c * third;
+            a[3][i] += c * fourth;
+        }
+    }
+}
+
+/* a_1 .. a_4 of eight steps whose middles are middle + low. */
+static inline void generators(const Input *u, const Source *source, V middle, V low, V h, const double *const *table,
+    V a[ORDERS][DIM])
+{
+    EACH(j, ORDERS) {
+        EACH(i, DIM) { a[j][i] = splat(0.0); }
+    }
+    for (ptrdiff_t f = 0; f < u->rates; ++f) {
+        const V rate = splat(u->rate[f]), angle = rate * middle, *k = source->weights + f * ORDERS;
+        const V rest = fused(rate, middle, -angle) + (u->rate_low[f] * middle + rate * low);
+        V c, s;
+        cos_sin(angle, rest, &c, &s);
+        EACH(i, DIM) {
+            const V x = source->cosines[f * DIM + i], y = source->sines[f * DIM + i];
+            const V p = h * (x * c + y * s), q = h * (y * c - x * s);
+            a[0][i] += k[0] * p;
+            a[1][i] += k[1] * q;
+            a[2][i] += k[2] * p;
+            a[3][i] += k[3] * q;
+        }
+    }
+    if (u->terms) {
+        from_series(u, source, middle, low, h, a);
+    } else if (u->times) {
+        const V x = ((middle - source->start) + low) / source->width, part = h / source->width;
+        EACH(i, DIM) {
+            a[0][i] += h * (source->left[i] + x * source->slope[i]);
+            a[1][i] += h * part * source->slope[i];
+        }
+    }
+    if (u->table) {
+        from_nodes(u, table, DIM, h, a);
+    }
+    EACH(j, ORDERS) {
+        EACH(i, DIM) { a[j][i] *= source->factor; }
+    }
+}
+
+#endif

@@ -1,0 +1,147 @@
+/* The state of a lane, a unit quaternion or the rows of X that vary: X <- X exp(Omega), and X as a whole matrix. */
+#ifndef MAGNUS_MOVE_H
+#define MAGNUS_MOVE_H
+
+#if QUATERNION
+/* q (dq - 1) is added; cos - 1 and sin / x in even powers of the half angle, no root and no division. */
+static inline void move(const V *omega, V *q)
+{
+    const V x = omega[0] * HALF, y = omega[1] * HALF, z = omega[2] * HALF;
+    V r = x * x + y * y + z * z, scale = splat(1.0);
+    int halvings = 0;
+    for (double most = largest(r); most > 0.6 && halvings < 60; most *= 0.25) {
+        ++halvings;
+        scale *= 0.5;
+    }
+    r *= scale * scale;
+    V c = r * (-0.5 + r * (1.0 / 24 + r * (-1.0 / 720 + r * (1.0 / 40320 + r * (-1.0 / 3628800 + r * (1.0 / 479001600
+        + r * (-1.0 / 87178291200.0 + r * (1.0 / 20922789888000.0))))))));
+    V s = scale * (1.0 + r * (-1.0 / 6 + r * (1.0 / 120 + r * (-1.0 / 5040 + r * (1.0 / 362880 + r * (-1.0 / 39916800
+        + r * (1.0 / 6227020800.0 + r * (-1.0 / 1307674368000.0 + r * (1.0 / 355687428096000.0)))))))));
+    for (; halvings; --halvings) { /* cos 2x - 1 and sin 2x */
+        s = 2.0 * s * (1.0 + c);
+        c = 2.0 * c * (2.0 + c);
+    }
+    const V vx = s * x, vy = s * y, vz = s * z, q0 = q[0], qx = q[1], qy = q[2], qz = q[3];
+    q[0] += q0 * c - (qx * vx + qy * vy + qz * vz);
+    q[1] += qx * c + (q0 * vx + (qy * vz - qz * vy));
+    q[2] += qy * c + (q0 * vy + (qz * vx - qx * vz));
+    q[3] += qz * c + (q0 * vz + (qx * vy - qy * vx));
+}
+#else
+static const double inverse_factorial[19] = {1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040,
+    1.0 / 40320, 1.0 / 362880, 1.0 / 3628800, 1.0 / 39916800, 1.0 / 479001600, 1.0 / 6227020800.0, 1.0 / 87178291200.0,
+    1.0 / 1307674368000.0, 1.0 / 20922789888000.0, 1.0 / 355687428096000.0, 1.0 / 6402373705728000.0};
+
+/* d = exp(A) - 1: Taylor of degree 6, 9, 12, 15 or 18 by Paterson and Stockmeyer in powers of A^3, halved and squared beyond. */
+static void increment(V *A, V *d)
+{
+    V square[MATRIX], cube[MATRIX], next[MATRIX], norm = splat(0.0);
+    int halvings = 0, degree;
+    EACH(k, MATRIX) { norm += A[k] * A[k]; }
+    double size = sqrt(largest(norm));
+    for (; size > 1.0 && halvings < 60; size *= 0.5) {
+        ++halvings;
+    }
+    if (halvings) {
+        EACH(k, MATRIX) { A[k] *= ldexp(1.0, -halvings); }
+    }
+    /* size^degree / (degree + 1)! below 1e-17 */
+    degree = size <= 0.006 ? 6 : size <= 0.07 ? 9 : size <= 0.24 ? 12 : size <= 0.56 ? 15 : 18;
+    multiply(A, A, square);
+    multiply(square, A, cube);
+    EACH(k, MATRIX) {
+        d[k] = inverse_factorial[degree - 2] * A[k] + inverse_factorial[degree - 1] * square[k] + inverse_factorial[degree] * cube[k];
+    }
+    for (int low = degree - 5; low > 0; low -= 3) {
+        multiply(cube, d, next);
+        EACH(k, MATRIX) {
+            d[k] = inverse_factorial[low] * A[k] + (inverse_factorial[low + 1] * square[k]
+                + (inverse_factorial[low + 2] * cube[k] + next[k]));
+        }
+    }
+    for (; halvings; --halvings) { /* (1 + d)^2 - 1 */
+        multiply(d, d, next);
+        EACH(k, MATRIX) { d[k] = 2.0 * d[k] + next[k]; }
+    }
+}
+
+static inline void move(const V *omega, V *X)
+{
+    V A[MATRIX], d[MATRIX], Xd[MATRIX];
+#if COORDINATES
+    hat(omega, A);
+#else
+    EACH(k, MATRIX) { A[k] = omega[k]; }
+#endif
+    increment(A, d);
+    multiply(X, d, Xd);
+    EACH(k, MATRIX) { X[k] += Xd[k]; }
+}
+#endif
+
+static inline void identity(V *state)
+{
+#if QUATERNION
+    EACH(k, 4) { state[k] = splat(k == 0 ? 1.0 : 0.0); }
+#else
+    EACH(k, MATRIX) { state[k] = splat(0.0); }
+    EACH(i, ROWS) { state[i * SIZE + i] = splat(1.0); }
+#endif
+}
+
+/* One lane of a state as a whole matrix: real parts, then imaginary ones. */
+static void to_matrix(const double *state, double *X)
+{
+    memset(X, 0, FULL * sizeof(double));
+#if QUATERNION
+    {
+        const double norm = sqrt(state[0] * state[0] + state[1] * state[1] + state[2] * state[2] + state[3] * state[3]);
+        const double unit[4] = {state[0] / norm, state[1] / norm, state[2] / norm, state[3] / norm};
+        quaternion_matrix(unit, X);
+    }
+#else
+    EACH(p, PARTS) { memcpy(X + p * SIZE * SIZE, state + p * ROWS * SIZE, ROWS * SIZE * sizeof(double)); }
+    for (int i = ROWS; i < SIZE; ++i) {
+        X[i * SIZE + i] = 1.0;
+    }
+#endif
+}
+
+/* z = x y of whole matrices, one lane. */
+static void multiply_one(const double *x, const double *y, double *z)
+{
+    EACH(i, SIZE) {
+        EACH(j, SIZE) {
+            double re = 0.0, im = 0.0;
+            EACH(m, SIZE) {
+                re += x[i * SIZE + m] * y[m * SIZE + j];
+#if PARTS == 2
+                re -= x[FULL / 2 + i * SIZE + m] * y[FULL / 2 + m * SIZE + j];
+                im += x[i * SIZE + m] * y[FULL / 2 + m * SIZE + j] + x[FULL / 2 + i * SIZE + m] * y[m * SIZE + j];
+#endif
+            }
+            z[i * SIZE + j] = re;
+            if (PARTS == 2) {
+                z[FULL / 2 + i * SIZE + j] = im;
+            }
+        }
+    }
+}
+
+/* Numpy's order: row by row, (re, im) together where complex. */
+static void put(const double *X, double *to)
+{
+    EACH(k, SIZE * SIZE) {
+        EACH(p, PARTS) { to[PARTS * k + p] = X[p * SIZE * SIZE + k]; }
+    }
+}
+
+static void get(const double *from, double *X)
+{
+    EACH(k, SIZE * SIZE) {
+        EACH(p, PARTS) { X[p * SIZE * SIZE + k] = from[PARTS * k + p]; }
+    }
+}
+
+#endif
