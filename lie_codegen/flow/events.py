@@ -86,14 +86,12 @@ def event_function(event: Event, degree: int, is_complex: bool, velocities: int 
     from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 
     t = sp.Symbol("t", real=True)
-    places = [(i, j) for i in range(degree) for j in range(degree)]
-    real = {place: sp.Symbol("X_{}_{}".format(*place), real=True) for place in places}
-    imaginary = {place: sp.Symbol("Y_{}_{}".format(*place), real=True) for place in places}
-    speeds = {(i,): sp.Symbol(f"xi_{i}", real=True) for i in range(velocities)}
+    places: list[tuple[int, ...]] = [(i, j) for i in range(degree) for j in range(degree)]
+    real: dict[tuple[int, ...], Any] = {place: sp.Symbol("X_{}_{}".format(*place), real=True) for place in places}
+    imaginary: dict[tuple[int, ...], Any] = {place: sp.Symbol("Y_{}_{}".format(*place), real=True) for place in places}
+    speeds: dict[tuple[int, ...], Any] = {(i,): sp.Symbol(f"xi_{i}", real=True) for i in range(velocities)}
     entries = {place: real[place] + sp.I * imaginary[place] for place in places} if is_complex else real
-    arrays: dict[str, dict[tuple[int, ...], Any]] = {"X": dict(entries)}
-    if velocities:
-        arrays["xi"] = dict(speeds)
+    arrays = {"X": entries, **({"xi": speeds} if velocities else {})}
     functions = dict(FORMULA_FUNCTIONS)
     if is_complex:
         functions |= {"re": _part(sp.re), "im": _part(sp.im), "abs": _modulus}
@@ -103,10 +101,11 @@ def event_function(event: Event, degree: int, is_complex: bool, velocities: int 
 
     def function(times: Array, X: Array, xi: Array | None) -> Array:
         values: dict[Any, Any] = {t: times}
-        for i, j in places:
-            values[real[i, j]], values[imaginary[i, j]] = X[:, i, j].real, X[:, i, j].imag
+        for place in places:
+            entry = X[:, place[0], place[1]]
+            values[real[place]], values[imaginary[place]] = entry.real, entry.imag
         if xi is not None:
-            values |= {symbol: xi[:, i] for (i,), symbol in speeds.items()}
+            values |= {symbol: xi[:, place[0]] for place, symbol in speeds.items()}
         with np.errstate(all="ignore"):
             found = ExpressionEvaluator(NumpyArithmetic(), values)(g)
         return np.broadcast_to(np.asarray(found, dtype=float), times.shape)

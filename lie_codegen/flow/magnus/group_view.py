@@ -86,7 +86,9 @@ def _quaternion(group: MatrixGroup, parts: int) -> tuple[float, tuple[tuple[Prod
     if np.max(np.abs(symmetric - half)) <= 1e-14 * np.max(np.abs(pairs)):
         table = {(0,): one, **Q}
     elif _is_spin_one(A, symmetric, s):
-        squares = {(k + 1, m + 1): (1 if k == m else 2) * symmetric[k, m] / s**2 for k in range(3) for m in range(k, 3)}
+        squares: dict[tuple[int, ...], NDArray[Any]] = {
+            (k + 1, m + 1): (1 if k == m else 2) * symmetric[k, m] / s**2 for k in range(3) for m in range(k, 3)
+        }
         table = {(): one, **{(0, *key): value for key, value in Q.items()}, **squares}
     else:
         return 0.0, ()

@@ -40,7 +40,7 @@ def exponent(group: MatrixGroup, a: Array, order: int) -> Array:
 
     def c(x: Array, y: Array) -> Array:
         outer = x[..., :, None] * y[..., None, :]
-        return np.asarray(-(outer.reshape(*outer.shape[:-2], -1) @ constants))
+        return np.asarray(-(outer.reshape(*outer.shape[:-2], group.dim**2) @ constants))
 
     a1, a2, a3, a4 = (a[..., j, :] for j in range(4))
     if order == 8:
