@@ -90,16 +90,14 @@ def as_drive(
 
 
 def drive_signal(drive: Drive, t: Array) -> Signal:
-    """The input of one trajectory, for the steps that take a Signal; its jumps and corners are where pieces became very short."""
+    """The input of one trajectory, for the steps that take a Signal."""
     if not drive.terms:
         return _of_formula(drive.formula.scaled(drive.factor[0]), t)
-    widths = np.diff(drive.times)
-    jumps = drive.times[1:][widths < 1e-5 * (t[-1] - t[0])]
 
     def evaluate(s: Array) -> Array:
         return drive.values(s, np.zeros_like(s), np.zeros(1))[:, 0]
 
-    return Signal(drive.series.shape[2], evaluate, jumps)
+    return Signal(drive.series.shape[2], evaluate, drive.corners)
 
 
 def _of_formula(formula: FormulaInput, t: Array) -> Signal:

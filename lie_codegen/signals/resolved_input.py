@@ -27,6 +27,8 @@ LONGEST_PIECE = 5.88
 _MOST_VALUES = 2**26
 _MOST_PIECES = 2**21
 _BLOCK = 2**20
+#: Of the interval: pieces are this short at jumps and corners only.
+_SHORT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,7 @@ class ResolvedInput:
         resolution: the longest gap between two values of u that were read; what is shorter may have been missed.
         evaluations: how many values were read.
         error: the integral over time of the distance to u, estimated at two places of each piece that are no nodes.
+        corners: (j,) where u is not smooth: named by the caller, or found, where pieces had to be very short.
     """
 
     times: Array
@@ -46,6 +49,7 @@ class ResolvedInput:
     resolution: float
     evaluations: int
     error: float
+    corners: Array
 
     def __call__(self, t: Array) -> Array:
         """(k,) -> (k, n)."""
@@ -125,7 +129,9 @@ def resolve_function(
     lefts, series = np.concatenate([each[0] for each in done]), np.concatenate([each[2] for each in done])
     order = np.argsort(lefts)
     times = np.append(lefts[order], end)
-    return ResolvedInput(times, np.ascontiguousarray(series[order]), WIDEST_GAP * widest, evaluations, error)
+    short = times[:-1][np.diff(times) < _SHORT * length]
+    corners = np.union1d(inside, short)
+    return ResolvedInput(times, np.ascontiguousarray(series[order]), WIDEST_GAP * widest, evaluations, error, corners)
 
 
 def _is_resolved(

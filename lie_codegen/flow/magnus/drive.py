@@ -27,7 +27,7 @@ class Drive:
         resolution: the longest gap between two values of u that were read; 0 for a formula, which is known everywhere.
         evaluations: how many values of u were read.
         error: the integral over time of |u - pieces|, estimated.
-        jumps: (j,) times at which u or a derivative jumps; steps end there.
+        corners: (j,) times at which u is not smooth.
     """
 
     formula: FormulaInput
@@ -38,7 +38,7 @@ class Drive:
     resolution: float
     evaluations: int
     error: float
-    jumps: Array
+    corners: Array
 
     @property
     def terms(self) -> int:
@@ -100,7 +100,7 @@ def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
     none, empty = np.empty((0, u.series.shape[-1])), np.empty(0)
     nothing = FormulaInput(empty, empty, none, none, empty, none, none)
     error = float(np.max(np.abs(row))) * u.error
-    return Drive(nothing, u.series, u.times, row, many, u.resolution, u.evaluations, error, u.times)
+    return Drive(nothing, u.series, u.times, row, many, u.resolution, u.evaluations, error, u.corners)
 
 
 def _row(factor: Array) -> tuple[Array, int | None]:

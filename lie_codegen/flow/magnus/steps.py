@@ -61,11 +61,11 @@ class Steps:
 
 
 def plan_steps(drive: Drive, gram: Array, times: Array, most: int) -> Steps | None:
-    """The coarsest steps that end at all the times (the first is the start) and at the jumps of u; None beyond `most`.
+    """The coarsest steps that end at all the times (the first is the start) and at the ends of the pieces of u; None beyond `most`.
 
     Every span has steps of its own density, so that a short pulse does not make the rest slow.
     """
-    inside = drive.jumps[(drive.jumps > times[0]) & (drive.jumps < times[-1])]
+    inside = drive.times[(drive.times > times[0]) & (drive.times < times[-1])]
     knots = np.union1d(times, inside)
     piece = drive.piece_of((knots[:-1] + knots[1:]) / 2)
     wanted = np.ceil(np.diff(knots) * drive.density(gram, piece) * (1 - 1e-12))
