@@ -89,11 +89,19 @@ SLOW_FORMS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class LaneStatement:
-    """const <type> <name> = <expression>;"""
+    """const <type> <name> = <expression>; an array of `results` vectors, which a macro fills lane by lane, if there are any."""
 
     type: str
     name: str
     expression: str
+    results: int = 0
+
+    @property
+    def text(self) -> str:
+        """As C."""
+        if not self.results:
+            return f"const {self.type} {self.name} = {self.expression};"
+        return f"{self.type} {self.name}[{self.results}]; {self.expression};"
 
 
 @dataclass(frozen=True)
@@ -233,6 +241,10 @@ class _Emitter:
                 name = self._pairs[operands] = f"{self._names.pair}{index}"
                 self.done.append(LaneStatement("lcg_pair", name, f"lcg_sincos({self.number(operands[0])})"))
             self._numbers[index] = f"{self._pairs[operands]}.{'s' if op == 'SIN' else 'c'}"
+        elif op == "CALL":
+            self._call(index, statement)
+        elif op == "RESULT":
+            self._numbers[index] = f"{self._numbers[operands[0]]}[{statement.slot[0]}]"
         elif op in MASK_FORMS:
             of = self._mask if op in _OF_MASKS else self.number
             self._add("lcg_m", index, MASK_FORMS[op].format(*[of(i) for i in operands]))
@@ -244,6 +256,18 @@ class _Emitter:
             if form is None:
                 raise CodegenError(f"operation {op} has no lane form: write the kernel without it")
             self._add("lcg_v", index, form.format(*[self.number(i) for i in operands]))
+
+    def _call(self, index: int, statement: Statement) -> None:
+        """One sample after another; a routine leaves its loops when its own numbers say so."""
+        routine = statement.routine
+        if routine is None:
+            raise CodegenError("a call without a routine")
+        name = f"{self._names.value}{index}"
+        condition, *values = (self.number(i) for i in statement.operands)
+        arguments = ", ".join(values)
+        expression = f"LCG_CALL({routine.name}, {routine.inputs}, {routine.outputs}, {condition}, {name}, {arguments})"
+        self.done.append(LaneStatement("lcg_v", name, expression, routine.outputs))
+        self._numbers[index] = name
 
     def _add(self, kind: str, index: int, expression: str) -> None:
         name = f"{self._names.value}{index}"

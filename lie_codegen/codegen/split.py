@@ -44,7 +44,12 @@ def split(tape: Tape, ports: int, limit: int | None = None) -> Split | None:
     computed = [index for index, statement in enumerate(tape.statements) if statement.op not in ("INPUT", "CONST")]
     if len(computed) <= limit:
         return None
-    cuts = [computed[start : start + limit] for start in range(0, len(computed), limit)]
+    cuts: list[list[int]] = [[]]
+    for index in computed:
+        # The results of a call stay with it: what crosses from part to part is a number.
+        if len(cuts[-1]) >= limit and tape.statements[index].op != "RESULT":
+            cuts.append([])
+        cuts[-1].append(index)
     home = {index: number for number, cut in enumerate(cuts) for index in cut}
     outputs = {index for port in tape.outputs for index in port}
     crossing = {

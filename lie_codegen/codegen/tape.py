@@ -7,19 +7,20 @@ every value has one name, so that the same program can be printed for scalars or
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from lie_codegen.errors import CodegenError
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.routine import Routine
 
 
 @dataclass(frozen=True)
 class Statement:
     """One value. `operands` are indices of earlier statements.
 
-    `op` is INPUT (entry `slot[1]` of port `slot[0]`), CONST (`value`), SELECT (operand 1 where operand
+    `op` is CALL (of `routine`, operands its condition and its inputs), RESULT (entry `slot[0]` of a CALL, which it follows), INPUT (entry `slot[1]` of port `slot[0]`), CONST (`value`), SELECT (operand 1 where operand
     0 is not zero, else operand 2), or CasADi's name without its OP_.
     """
 
@@ -27,6 +28,7 @@ class Statement:
     operands: tuple[int, ...] = ()
     slot: tuple[int, int] = (-1, -1)
     value: float = 0.0
+    routine: Routine | None = None
 
 
 @dataclass(frozen=True)
@@ -100,9 +102,33 @@ def _single_assignment(function: Any) -> tuple[list[Statement], list[list[int]]]
             work[written[0]] = add(Statement("INPUT", slot=(read[0], read[1])))
         elif op == "CONST":
             work[written[0]] = add(Statement("CONST", value=float(function.instruction_constant(k))))
+        elif op == "CALL":
+            routine = _routine_of(function, statements[work[read[0]]], len(read) - 2, len(written))
+            called = add(Statement("CALL", tuple(work[i] for i in read[1:]), routine=routine))
+            # All results, whether read or not, so that they follow the call at once: see `split`.
+            results = [add(Statement("RESULT", (called,), (entry, 0))) for entry in range(routine.outputs)]
+            for place, result in zip(written, results, strict=True):
+                if place >= 0:
+                    work[place] = result
         else:
             work[written[0]] = add(Statement(op, tuple(work[i] for i in read)))
     return statements, [[add(zero) if index < 0 else index for index in port] for port in outputs]
+
+
+def _routine_of(function: Any, number: Statement, inputs: int, outputs: int) -> Routine:
+    """The routine that a call names by its first argument.
+
+    Raises:
+        CodegenError: it is a derivative of one, which CasADi keeps as a function of its own.
+    """
+    from lie_codegen.kernel.casadi_arithmetic import routine_number
+
+    routine = routine_number(number.value)
+    if (inputs, outputs) != (routine.inputs, routine.outputs):
+        raise CodegenError(
+            f"{function.name()} differentiates {routine.name} by CasADi; differentiate the kernel's body with DualArithmetic instead"
+        )
+    return routine
 
 
 def _fuse_branches(statements: list[Statement]) -> list[Statement]:
@@ -142,5 +168,5 @@ def _schedule(statements: list[Statement], outputs: Iterable[Iterable[int]]) -> 
                 continue
             old = statements[each]
             place[each] = len(ordered)
-            ordered.append(Statement(old.op, tuple(place[i] for i in old.operands), old.slot, old.value))
+            ordered.append(replace(old, operands=tuple(place[i] for i in old.operands)))
     return Tape(tuple(ordered), tuple(tuple(place[i] for i in port) for port in outputs))

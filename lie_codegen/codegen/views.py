@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from lie_codegen.codegen.opcodes import C99, RESERVED, Target
 from lie_codegen.codegen.signature import is_step
 from lie_codegen.codegen.split import split
-from lie_codegen.codegen.tape import Tape
+from lie_codegen.codegen.tape import Statement, Tape, tape_of
+from lie_codegen.codegen.templates import render
+from lie_codegen.errors import CodegenError
 from lie_codegen.kernel.definition import described
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.routine import Routine
 
 _WIDTH = 108
 
@@ -57,10 +60,16 @@ class PortView:
 
 @dataclass(frozen=True)
 class StatementView:
-    """const <type> <name> = <expression>;"""
+    """const <type> <name> = <expression>;
+
+    A call of a routine leaves an array, of `results` doubles: <expression>(arguments, <name>), where `condition` holds if it has one.
+    """
 
     name: str
     expression: str
+    arguments: tuple[str, ...] = ()
+    results: int = 0
+    condition: str = ""
 
 
 @dataclass(frozen=True)
@@ -102,6 +111,14 @@ class KernelView:
 
 
 @dataclass(frozen=True)
+class RoutineView:
+    """A static function with loops: its text, after the kernels that it calls."""
+
+    helpers: tuple[KernelView, ...]
+    text: str
+
+
+@dataclass(frozen=True)
 class PackageView:
     """The whole package."""
 
@@ -113,6 +130,7 @@ class PackageView:
     version: str
     type_name: str
     kernels: tuple[KernelView, ...]
+    routines: tuple[RoutineView, ...] = ()
 
 
 def package_view(
@@ -139,7 +157,20 @@ def package_view(
         kernels=tuple(
             kernel_view(kernel, tape, target, in_parts=True) for kernel, tape in zip(kernels, tapes, strict=True)
         ),
+        routines=tuple(routine_view(routine) for routine in routines_of(tapes)),
     )
+
+
+def routines_of(tapes: Iterable[Tape]) -> tuple[Routine, ...]:
+    """The routines that tapes call, each once."""
+    found = (statement.routine for tape in tapes for statement in tape.statements)
+    return tuple(dict.fromkeys(routine for routine in found if routine is not None))
+
+
+def routine_view(routine: Routine) -> RoutineView:
+    """The C text of a routine and of the kernels it calls, all in double."""
+    helpers = tuple(kernel_view(kernel, tape_of(kernel), in_parts=True) for kernel in routine.helpers)
+    return RoutineView(helpers, render(routine.template, name=routine.name, **dict(routine.settings)))
 
 
 def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: bool = False) -> KernelView:
@@ -155,13 +186,13 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: b
     last, size = (tape, 0) if pieces is None else (pieces.last, pieces.size)
     parts = []
     for part in pieces.parts if pieces is not None else ():
-        statements, values = _printed(part.tape, [*names, work], [*scalars, work], target, prefix)
+        statements, values = _printed(part.tape, [*names, work], [*scalars, work], target, prefix, calls=True)
         stores = tuple(
             StoreView(work, place, values[index])
             for place, index in zip(part.places, part.tape.outputs[0], strict=True)
         )
         parts.append(PartView(statements, stores, _unread(inputs, part.tape)))
-    statements, values = _printed(last, [*names, work], [*scalars, work], target, prefix)
+    statements, values = _printed(last, [*names, work], [*scalars, work], target, prefix, calls=in_parts)
     return KernelView(
         name=kernel.name,
         symbol=kernel.symbol,
@@ -185,7 +216,7 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: b
 
 
 def _printed(
-    tape: Tape, arrays: Sequence[str | None], scalars: Sequence[str], target: Target, prefix: str
+    tape: Tape, arrays: Sequence[str | None], scalars: Sequence[str], target: Target, prefix: str, *, calls: bool
 ) -> tuple[tuple[StatementView, ...], list[str]]:
     """The statements, and the text of every value; a port without an array is a scalar."""
     values: list[str] = []
@@ -198,11 +229,30 @@ def _printed(
             port, entry = statement.slot
             array = arrays[port]
             text = scalars[port] if array is None else target.load.format(array, entry)
+        elif statement.op == "CALL":
+            if not calls:
+                raise CodegenError("a kernel that calls a routine has no form in this package: it is printed in packages of kernels alone")
+            values.append(f"{prefix}{index}")
+            statements.append(_call(statement, values))
+            continue
+        elif statement.op == "RESULT":
+            # Routines are in double whatever the target is.
+            number = f"{values[statement.operands[0]]}[{statement.slot[0]}]"
+            text = number if target.type_name == "double" else f"({target.type_name}){number}"
         else:
             text = target.expression(statement.op, tuple(values[i] for i in statement.operands))
         values.append(f"{prefix}{index}")
         statements.append(StatementView(values[-1], text))
     return tuple(statements), values
+
+
+def _call(statement: Statement, values: Sequence[str]) -> StatementView:
+    routine = statement.routine
+    if routine is None:
+        raise CodegenError("a call without a routine")
+    condition, *arguments = (values[i] for i in statement.operands)
+    always = condition.rstrip("f") == C99.literal(1.0)
+    return StatementView(values[-1], routine.name, tuple(arguments), routine.outputs, "" if always else condition)
 
 
 def _unread(inputs: Sequence[PortView], tape: Tape) -> tuple[str, ...]:

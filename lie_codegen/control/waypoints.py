@@ -13,7 +13,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.logarithm import log_coordinates
+from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex

@@ -54,15 +54,14 @@ class GroupDerivation:
         return spectral_pattern(self.ads)
 
     @cached_property
-    def log_structure(self) -> LogStructure | None:
-        """The blocks the logarithm is read from; None where one is of no known kind."""
+    def log_structure(self) -> LogStructure:
+        """The blocks the logarithm is read from."""
         return log_structure(self.group)
 
     @cached_property
     def section_pattern(self) -> tuple[ColumnPattern, ...] | None:
         """Annihilating polynomials of ad x for the x that the blocks alone determine."""
-        structure = self.log_structure
-        pivots = structure.pivots if structure is not None else ()
+        pivots = self.log_structure.pivots
         zero = sp.zeros(self.group.dim, self.group.dim)
         return spectral_pattern([self.ads[i] if i in pivots else zero for i in range(self.group.dim)])
 

@@ -24,7 +24,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.maps.exponential import ad_body, exp_matrix, jacobian
-from lie_codegen.groups.maps.logarithm import log_coordinates
+from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.maps.renormalise import renormalised
 from lie_codegen.groups.matrix_group import MatrixGroup

@@ -88,3 +88,8 @@ class FloatArithmetic:
 
     def where(self, condition: bool, then: float, otherwise: float) -> float:
         return then if condition else otherwise
+
+    def call(self, routine: Any, values: list[Any], when: Any = None) -> list[float]:
+        from lie_codegen.kernel.routine import evaluated
+
+        return evaluated(routine, values, when)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from lie_codegen.errors import ShapeError
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.routine import Routine, evaluated
 
 
 class CasadiArithmetic:
@@ -39,6 +42,78 @@ class CasadiArithmetic:
 
     def where(self, condition: Any, then: Any, otherwise: Any) -> Any:
         return ca.if_else(condition, then, otherwise)
+
+    def call(self, routine: Routine, values: list[Any], when: Any = None) -> list[Any]:
+        """A call inside the expression; its first argument is the routine's number, by which `routine_number` knows it."""
+        function = _called(routine)
+        condition = 1.0 if when is None else when
+        result = function(_NUMBERS[routine], condition, ca.vertcat(*[ca.SX(value) for value in values]))
+        return list(ca.vertsplit(ca.SX(result)))
+
+
+class _RoutineFunction(ca.Callback):
+    """A routine as a CasADi Function (number, condition, inputs) -> outputs, with its own derivative."""
+
+    def __init__(self, routine: Routine) -> None:
+        ca.Callback.__init__(self)
+        self.routine = routine
+        self.kept: list[Any] = []
+        self.construct(ca.Function.fix_name(routine.name), {"never_inline": True})
+
+    def get_n_in(self) -> int:
+        return 3
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self.routine.inputs if i == 2 else 1, 1)
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self.routine.outputs, 1)
+
+    def eval(self, arguments: Any) -> list[Any]:
+        values = np.array(arguments[2], dtype=np.float64).ravel()
+        return [ca.DM(evaluated(self.routine, values.tolist(), float(arguments[1]) != 0.0))]
+
+    def has_forward(self, count: int) -> bool:
+        return True
+
+    def get_forward(self, count: int, name: str, inames: Any, onames: Any, options: Any) -> ca.Function:
+        ops, routine = CasadiArithmetic(), self.routine
+        number, condition = ca.SX.sym("number"), ca.SX.sym("condition")
+        inputs, outputs = ca.SX.sym("inputs", routine.inputs), ca.SX.sym("outputs", routine.outputs)
+        rates = ca.SX.sym("rates", routine.inputs, count)
+        unused = [ca.SX.sym("unused", 1, count), ca.SX.sym("unused", 1, count)]
+        columns = []
+        for k in range(count):
+            seeds = ca.vertsplit(rates[:, k])
+            moved = routine.tangent(ops, ca.vertsplit(inputs), ca.vertsplit(outputs), seeds)
+            columns.append(ca.vertcat(*[ca.if_else(condition, ca.SX(entry), 0) for entry in moved]))
+        result = ca.densify(ca.horzcat(*columns))
+        function = ca.Function(
+            name, [number, condition, inputs, outputs, *unused, rates], [result], inames, onames, {"cse": True}
+        )
+        self.kept.append(function)
+        return function
+
+
+_FUNCTIONS: dict[Routine, _RoutineFunction] = {}
+_NUMBERS: dict[Routine, float] = {}
+_LOCK = threading.Lock()
+
+
+def _called(routine: Routine) -> _RoutineFunction:
+    with _LOCK:
+        if routine not in _FUNCTIONS:
+            _NUMBERS[routine] = float(len(_NUMBERS) + 1)
+            _FUNCTIONS[routine] = _RoutineFunction(routine)
+        return _FUNCTIONS[routine]
+
+
+def routine_number(number: float) -> Routine:
+    """The routine that a call in an expression names by its first argument."""
+    return next(routine for routine, each in _NUMBERS.items() if each == number)
 
 
 def function_of(kernel: Kernel) -> ca.Function:

@@ -48,6 +48,9 @@ class Complex:
         norm = o.re * o.re + o.im * o.im
         return Complex((self.re * o.re + self.im * o.im) / norm, (self.im * o.re - self.re * o.im) / norm)
 
+    def __rtruediv__(self, other: Any) -> Complex:
+        return Complex.of(other) / self
+
     def conjugate(self) -> Complex:
         """re - i im."""
         return Complex(self.re, -self.im)

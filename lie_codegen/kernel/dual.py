@@ -13,6 +13,7 @@ from typing import Any
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import add, is_zero, product
+from lie_codegen.kernel.routine import call_routine
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,6 +171,23 @@ class DualArithmetic:
             return value
         keys = {**da, **db}
         return Dual(value, {i: self.ops.where(condition, da.get(i, 0), db.get(i, 0)) for i in keys}, self.level)
+
+    def call(self, routine: Any, values: list[Any], when: Any = None) -> list[Scalar]:
+        """The routine, and its own derivative along every direction."""
+        pairs = [split(value, self.level) for value in values]
+        plain = [value for value, _ in pairs]
+        outputs = call_routine(self.ops, routine, plain, when)
+        directions = sorted({i for _, tangent in pairs for i in tangent})
+        if not directions:
+            return outputs
+        rates: dict[int, list[Scalar]] = {}
+        for i in directions:
+            moved = routine.tangent(self.ops, plain, outputs, [tangent.get(i, 0) for _, tangent in pairs])
+            rates[i] = moved if when is None else [self.ops.where(when, rate, 0) for rate in moved]
+        return [
+            Dual(value, {i: rates[i][k] for i in directions if not is_zero(rates[i][k])}, self.level)
+            for k, value in enumerate(outputs)
+        ]
 
     def _chain(self, x: Any, function: Callable[[Any], Any], slope: Callable[[Any, Any], Any]) -> Scalar:
         value, tangent = split(x, self.level)

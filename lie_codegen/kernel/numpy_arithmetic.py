@@ -42,6 +42,16 @@ class NumpyArithmetic:
     def where(self, condition: Any, then: Any, otherwise: Any) -> Any:
         return np.where(condition, then, otherwise)
 
+    def call(self, routine: Any, values: list[Any], when: Any = None) -> list[Any]:
+        """The routine at one point after another."""
+        condition = np.asarray(True if when is None else when)
+        shape = np.broadcast_shapes(condition.shape, *(np.shape(value) for value in values))
+        points = np.stack([np.broadcast_to(value, shape).ravel() for value in values], axis=-1).astype(np.float64)
+        results = np.zeros((len(points), routine.outputs))
+        for k in np.flatnonzero(np.broadcast_to(condition, shape).ravel()):
+            results[k] = routine.evaluate(points[k])
+        return [results[:, i].reshape(shape) for i in range(routine.outputs)]
+
 
 def evaluate(kernel: Kernel, *arguments: ArrayLike) -> tuple[Array, ...]:
     """The outputs of a real kernel at one point or at many; batch axes lead and broadcast.

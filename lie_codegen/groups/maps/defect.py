@@ -24,7 +24,7 @@ from lie_codegen.kernel.linear import Matrix, matmul, number, total
 WRONG_COMPONENT = 2
 #: What a determinant of entries of size 1 may be off by, generously.
 _ROUNDING = 1e-13
-_FINITE = 1e300
+_FINITE = math.inf
 
 #: (what, relative figure, figure as it stands)
 Figure = tuple[str, Scalar, Scalar]

@@ -1,4 +1,4 @@
-"""log(X) on its principal domain, and the blocks and steps it is made of.
+"""The candidate for log(X), and the blocks and steps it is made of.
 
 1. The diagonal blocks give T x (see `log_structure`); x_0 is the section of T x. exp(x_0) is the block-diagonal part D of X
    when the section's matrices are block diagonal.
@@ -7,7 +7,7 @@
    The error lies in ker T and its depth in the lower central series doubles, so finitely many steps are exact: one for
    SE(2), SE(3) and SE_2(3), where ker T is abelian; two for class 2 and 3.
 
-Where a block is of no known kind, the whole matrix is taken: see `spectral_functions`.
+Where a block has no closed form its logarithm is iterated: `log_routine`.
 """
 
 from __future__ import annotations
@@ -16,34 +16,37 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from lie_codegen.groups.derivation import GroupDerivation
-from lie_codegen.groups.maps.exponential import coordinates, exp_matrix, jacobian, real_coordinates
+from lie_codegen.groups.maps.exponential import exp_matrix, jacobian, real_coordinates
 from lie_codegen.groups.maps.log_blocks import (
     Entries,
+    complex2_log,
     determinant_3,
+    lorentz_log,
     plane_log,
     real2_log,
+    space4_log,
     space_log,
     spin_log,
 )
 from lie_codegen.groups.maps.log_structure import LogBlock, LogStructure
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.matrix_function import RIGHT_JACOBIAN_INVERSE, FunctionOfMatrix, LinearFamily
-from lie_codegen.groups.maps.spectral_functions import logarithm
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, Vector, matadd, matmul, matvec, number, plus
 
 
-def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Entries) -> Vector:
-    """The x with exp(hat(x)) = X."""
+def candidate(ops: Arithmetic, data: GroupDerivation, X: Entries, iterated: Sequence[Scalar] = ()) -> Vector:
+    """The x that the logarithms of the diagonal blocks give; those of iterated blocks one after another in `iterated`."""
     structure = data.log_structure
-    if structure is None:
-        matrices = GroupMatrices(ops, data.real)
-        X_inverse = matrices.write(matrices.inverse(matrices.read(X)))
-        A = logarithm(ops, X, X_inverse, data.matrix_spectrum, data.matrix_relation, unitary=data.is_unitary)
-        return coordinates(ops, data, A)
-    logs = [value for block in structure.blocks for value in block_log(ops, block, X)]
+    logs: Vector = []
+    left = list(iterated)
+    for block in structure.blocks:
+        if block.is_iterated:
+            logs, left = logs + left[: len(block.rows)], left[len(block.rows) :]
+        else:
+            logs += block_log(ops, block, X)
     x: Vector = [0] * data.group.dim
     for i, weights in structure.section:
         for r, weight in weights.items():
@@ -67,6 +70,12 @@ def block_log(ops: Arithmetic, block: LogBlock, X: Entries) -> list[Scalar]:
         return [angle, ops.log(square) / 2] if block.scaled else [angle]
     if block.kind == "spin":
         return spin_log(ops, part)
+    if block.kind == "space4":
+        return space4_log(ops, part)
+    if block.kind == "lorentz":
+        return lorentz_log(ops, part)
+    if block.kind == "complex2":
+        return complex2_log(ops, part)
     if block.kind == "space":
         if not block.scaled:
             return space_log(ops, part)

@@ -20,7 +20,7 @@ from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import determinant
 from lie_codegen.groups.maps.exponential import exp_matrix
-from lie_codegen.groups.maps.logarithm import log_coordinates
+from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.membership import Form, Membership, blocks_suffice, membership
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar

@@ -1,0 +1,270 @@
+"""log(X): the candidate, and what makes it a number that was checked.
+
+    log X = the x in the algebra with exp(hat x) = X that minimises sum_j (Im mu_j)^2 over the eigenvalues mu_j of hat x.
+
+Where the principal logarithm lies in the algebra it is this one. Where every block of X has a closed form and they do not depend on each other, the
+closed form is exact on all of the group, and membership (`defect`) is its certificate; off the group by rounding of single precision or so, and for
+all other groups, the routine of this file is called:
+
+    1. a candidate from the blocks: Jacobi rotations of unitary matrices, the real split of orthogonal ones, Schur form and square roots,
+    2. E = exp(-hat x) X - 1, u = vee E: Newton's steps x <- x + rjac_inv(x) u as long as u falls,
+    3. x where |u| <= 1e-12 kappa and the distance from the group |E - hat u| <= 1e-5 kappa, kappa = max(1, |X| |X^-1|),
+    4. else every logarithm of X is looked through (`log_lattice`), and NaN where there is none.
+
+The derivative is D log(X)[X hat v] = rjac_inv(x) v on every branch: not that of sweeps, selections and roots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.defect import defect, largest
+from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
+from lie_codegen.groups.maps.log_iterations import matrix_log, rotation_log, unitary_log
+from lie_codegen.groups.maps.log_structure import LogBlock
+from lie_codegen.groups.maps.logarithm import candidate
+from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
+from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernel.block_solve import add, is_zero, product
+from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import Matrix, Vector, matmul, matvec, total
+from lie_codegen.kernel.routine import Routine, call_routine
+
+Array = NDArray[np.float64]
+
+#: The defect up to which a closed form is taken as it is: rounding.
+_ROUNDING = 1e-13
+_STEPS = 3
+_RESIDUAL, _DISTANCE = 1e-12, 1e-5
+_SETTLED = 4e-15
+
+
+def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector:
+    """The x with exp(hat x) = X, of the nearest element within 1e-5 of the group; NaN where there is none."""
+    entries = [list(row) for row in X]
+    flat = [part for row in entries for entry in row for part in _parts(entry, data.group.is_complex)]
+    if not data.log_structure.is_closed:
+        return call_routine(ops, log_routine(data), flat)
+    x = candidate(ops, data, entries)
+    # Not `less(rounding, defect)`, which is false for NaN.
+    on_group = ops.less(defect(ops, data, entries), ops.constant(_ROUNDING))
+    off_group = ops.less(ops.where(on_group, ops.constant(-1), 0), ops.constant(-0.5))
+    checked = call_routine(ops, log_routine(data), flat, ops.where(off_group, 0, ops.constant(1)))
+    return [ops.where(on_group, closed, value) for closed, value in zip(x, checked, strict=True)]
+
+
+def _parts(entry: Any, is_complex: bool) -> list[Scalar]:
+    if not is_complex:
+        return [entry]
+    z = Complex.of(entry)
+    return [z.re, z.im]
+
+
+@lru_cache(maxsize=32)
+def log_routine(data: GroupDerivation) -> Routine:
+    """The checked logarithm of a group as a routine: X flat (complex entries as pairs) to x."""
+    group, structure = data.group, data.log_structure
+    d, n = group.degree, group.dim
+    X, x, u = matrix_port(group, "X"), Port("x", (n,)), Port("u", (n,))
+    size = sum(len(block.rows) for block in structure.iterated)
+    logs = (Port("logs", (size,)),) if size else ()
+
+    def from_blocks(ops: Arithmetic, X: Any, *logs: Any) -> tuple[Any, ...]:
+        return (candidate(ops, data, X, *logs),)
+
+    def error(ops: Arithmetic, x: Any, X: Any) -> tuple[Any, ...]:
+        return _error(ops, data, x, X)
+
+    first = Kernel("log_candidate", group.name, (X, *logs), (x,), from_blocks)
+    second = Kernel("log_error", group.name, (x, X), (u, Port("error", (2,))), error)
+    blocks, start = [], 0
+    for block in structure.iterated:
+        blocks.append({"kind": block.kind, "indices": block.indices, "special": block.special, "start": start})
+        start += len(block.rows)
+    settings = (
+        ("degree", d),
+        ("dim", n),
+        ("is_complex", group.is_complex),
+        ("kinds", tuple(sorted({block.kind for block in structure.iterated}))),
+        ("blocks", _Frozen(blocks)),
+        ("logs_size", size),
+        ("constants", tuple((i, j, k, float(c)) for i, j, k, c in group.algebra.constants())),
+        ("candidate_symbol", first.symbol),
+        ("error_symbol", second.symbol),
+    )
+    twin = _Twin(data, first, second)
+    return Routine(
+        f"{group.name}_log_checked",
+        d * d * (2 if group.is_complex else 1),
+        n,
+        "log_routine.c.jinja",
+        settings,
+        (first, second),
+        twin,
+        _tangent(data),
+    )
+
+
+class _Frozen(tuple[Any, ...]):
+    """A list of records of plain data that can be a part of a key."""
+
+    def __hash__(self) -> int:
+        return hash(repr(tuple(self)))
+
+
+def vee(ops: Arithmetic, data: GroupDerivation, A: Sequence[Sequence[Any]]) -> Vector:
+    """The x with hat x nearest to A (least squares over all entries)."""
+    group = data.group
+    flat = [Complex.of(entry) if group.is_complex else entry for row in A for entry in row]
+    entries = [z.re for z in flat] + [z.im for z in flat] if group.is_complex else flat
+    rows = np.where(np.abs(group.coordinate_rows) < 1e-15, 0.0, group.coordinate_rows)
+    return [
+        total(product(_weight(ops, float(w)), entry) for w, entry in zip(row, entries, strict=False) if w)
+        for row in rows
+    ]
+
+
+def _weight(ops: Arithmetic, value: float) -> Scalar:
+    """Coordinates of a plain basis are simple fractions."""
+    nearest = round(value * 24) / 24
+    value = nearest if abs(value - nearest) < 1e-14 else value
+    return int(value) if value == int(value) else ops.constant(value)
+
+
+def _error(ops: Arithmetic, data: GroupDerivation, x: Vector, X: Any) -> tuple[Any, ...]:
+    """u = vee E, and (|E - hat u|, kappa), for E = exp(-hat x) X - 1."""
+    group = data.group
+    d = range(group.degree)
+    backward = exp_matrix(ops, data, [product(-1, c) for c in x])
+    E = [[_minus(entry, int(i == j)) for j, entry in enumerate(row)] for i, row in enumerate(matmul(backward, X))]
+    u = vee(ops, data, E)
+    hat: Matrix = [[0 for _ in d] for _ in d]
+    for c, matrix in zip(u, group.exact_basis, strict=True):
+        for i in d:
+            for j in d:
+                if matrix[i, j] != 0:
+                    re, im = matrix[i, j].as_real_imag()
+                    weight: Any = ops.constant(re) if im == 0 else Complex(ops.constant(re), ops.constant(im))
+                    hat[i][j] = add(hat[i][j], c * weight if im == 0 else Complex(c * weight.re, c * weight.im))
+    rest = [part for i in d for j in d for part in _parts(_minus(E[i][j], hat[i][j]), group.is_complex)]
+    distance = ops.sqrt(total(product(part, part) for part in rest))
+    sizes = []
+    for matrix in (X, backward):
+        parts = [part for row in matrix for entry in row for part in _parts(entry, group.is_complex)]
+        sizes.append(largest(ops, [ops.fabs(part) for part in parts if not is_zero(part)]))
+    return u, [distance, largest(ops, [1, sizes[0] * sizes[1]])]
+
+
+def _minus(a: Any, b: Any) -> Any:
+    return add(a, product(-1, b))
+
+
+def _tangent(data: GroupDerivation) -> Any:
+    group = data.group
+    d = group.degree
+
+    def matrix(values: Sequence[Scalar]) -> Matrix:
+        if group.is_complex:
+            values = [Complex(re, im) for re, im in zip(values[::2], values[1::2], strict=True)]
+        return [list(values[i * d : (i + 1) * d]) for i in range(d)]
+
+    def tangent(
+        ops: Arithmetic, inputs: Sequence[Scalar], outputs: Sequence[Scalar], rates: Sequence[Scalar]
+    ) -> list[Scalar]:
+        # vee(X^{-1} dX): least squares, so that noise across the group does not move the logarithm.
+        matrices = GroupMatrices(ops, data.real)
+        inverse = matrices.inverse(matrices.read(matrix(inputs)))
+        rate = real_rows(matrix(rates)) if group.is_complex else matrix(rates)
+        velocity = vee(ops, data, matrices.write(matmul(inverse, rate)))
+        return matvec(jacobian(ops, data, outputs, "right", inverse=True), velocity)
+
+    return tangent
+
+
+class _Twin:
+    """The routine in NumPy."""
+
+    def __init__(self, data: GroupDerivation, first: Kernel, second: Kernel) -> None:
+        self.data = data
+        self.first = first
+        self.second = second
+        self.ops = FloatArithmetic()
+
+    def __call__(self, flat: Array) -> Array:
+        group = self.data.group
+        d = group.degree
+        X: NDArray[Any] = (flat[::2] + 1j * flat[1::2] if group.is_complex else flat).reshape(d, d)
+        nothing = np.full(group.dim, np.nan)
+        if not np.all(np.isfinite(flat)):
+            return nothing
+        with np.errstate(all="ignore"):
+            for start in (self._candidate,):
+                x = start(X)
+                if x is not None and self._certified(x, X):
+                    return x
+        return nothing
+
+    def _candidate(self, X: NDArray[Any]) -> Array | None:
+        try:
+            logs = [value for block in self.data.log_structure.iterated for value in self._block(block, X)]
+            arguments = [logs] if logs else []
+            (x,) = self.first.evaluate(self.ops, self._scalars(X), *arguments)
+        except (ValueError, ZeroDivisionError, OverflowError, np.linalg.LinAlgError):
+            return None
+        return np.array([float(value) for value in x])
+
+    def _block(self, block: LogBlock, X: NDArray[Any]) -> list[float]:
+        part = X[np.ix_(block.indices, block.indices)]
+        if block.kind == "rotation":
+            A: NDArray[Any] = rotation_log(part)
+        else:
+            A = unitary_log(part, special=block.special) if block.kind == "unitary" else matrix_log(part)
+        if not self.data.group.is_complex:
+            return [float(value) for value in A.real.ravel()]
+        return [float(value) for value in A.ravel().view(np.float64)]
+
+    def _scalars(self, X: NDArray[Any]) -> list[list[Any]]:
+        if self.data.group.is_complex:
+            return [[Complex(float(z.real), float(z.imag)) for z in row] for row in X]
+        return [[float(entry) for entry in row] for row in X]
+
+    def _certified(self, x: Array, X: NDArray[Any]) -> bool:
+        """Newton's steps in place; whether x is then a logarithm."""
+        scalars = self._scalars(X)
+
+        def error(x: Array) -> tuple[Array, float, float]:
+            try:
+                u, (distance, kappa) = self.second.evaluate(self.ops, x.tolist(), scalars)
+            except (ValueError, ZeroDivisionError, OverflowError):
+                return np.full(len(x), np.nan), np.nan, np.nan
+            return np.array([float(value) for value in u]), float(distance), float(kappa)
+
+        u, distance, kappa = error(x)
+        for _ in range(_STEPS):
+            if np.max(np.abs(u)) <= _SETTLED * kappa:
+                break
+            y = x + np.linalg.solve(right_jacobian(self.data, x), u)
+            v, *fresh = error(y)
+            if not np.max(np.abs(v)) < np.max(np.abs(u)):
+                break
+            x[:] = y
+            u, (distance, kappa) = v, fresh
+        return bool(np.max(np.abs(u)) <= _RESIDUAL * kappa and distance <= _DISTANCE * kappa)
+
+
+def right_jacobian(data: GroupDerivation, x: Array) -> Array:
+    """(1 - e^{-ad x})/ad x, from the exponential of [[-ad, 1], [0, 0]]."""
+    n = len(x)
+    both = np.zeros((2 * n, 2 * n))
+    for i, j, k, value in data.group.algebra.constants():
+        both[k, j] -= x[i] * float(value)
+    both[:n, n:] = np.eye(n)
+    return np.asarray(scipy.linalg.expm(both)[:n, n:])
