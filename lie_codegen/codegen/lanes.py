@@ -263,8 +263,8 @@ class _Emitter:
         if routine is None:
             raise CodegenError("a call without a routine")
         name = f"{self._names.value}{index}"
-        condition, *values = (self.number(i) for i in statement.operands)
-        arguments = ", ".join(values)
+        condition = self._mask(statement.operands[0])
+        arguments = ", ".join(self.number(i) for i in statement.operands[1:])
         expression = f"LCG_CALL({routine.name}, {routine.inputs}, {routine.outputs}, {condition}, {name}, {arguments})"
         self.done.append(LaneStatement("lcg_v", name, expression, routine.outputs))
         self._numbers[index] = name

@@ -231,7 +231,9 @@ def _printed(
             text = scalars[port] if array is None else target.load.format(array, entry)
         elif statement.op == "CALL":
             if not calls:
-                raise CodegenError("a kernel that calls a routine has no form in this package: it is printed in packages of kernels alone")
+                raise CodegenError(
+                    "a kernel that calls a routine has no form in this package: it is printed in packages of kernels alone"
+                )
             values.append(f"{prefix}{index}")
             statements.append(_call(statement, values))
             continue

@@ -90,6 +90,7 @@ class FloatArithmetic:
         return then if condition else otherwise
 
     def call(self, routine: Any, values: list[Any], when: Any = None) -> list[float]:
-        from lie_codegen.kernel.routine import evaluated
-
-        return evaluated(routine, values, when)
+        """The outputs of a `Routine`; zeros where `when` is given and does not hold."""
+        if when is not None and not when:
+            return [0.0] * int(routine.outputs)
+        return [float(value) for value in routine.evaluate([float(value) for value in values])]

@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 
 from lie_codegen.errors import ShapeError
+from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.routine import Routine, evaluated
+from lie_codegen.kernel.routine import Routine
 
 
 class CasadiArithmetic:
@@ -74,7 +75,7 @@ class _RoutineFunction(ca.Callback):
 
     def eval(self, arguments: Any) -> list[Any]:
         values = np.array(arguments[2], dtype=np.float64).ravel()
-        return [ca.DM(evaluated(self.routine, values.tolist(), float(arguments[1]) != 0.0))]
+        return [ca.DM(FloatArithmetic().call(self.routine, values.tolist(), float(arguments[1]) != 0.0))]
 
     def has_forward(self, count: int) -> bool:
         return True

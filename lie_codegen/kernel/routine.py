@@ -48,7 +48,7 @@ class Routine:
     template: str
     settings: tuple[tuple[str, Any], ...]
     helpers: tuple[Kernel, ...]
-    evaluate: Callable[[Array], Array] = field(compare=False)
+    evaluate: Callable[[Sequence[float]], Sequence[float] | Array] = field(compare=False)
     tangent: Tangent = field(compare=False)
 
     def __post_init__(self) -> None:
@@ -66,10 +66,3 @@ def call_routine(ops: Any, routine: Routine, values: Sequence[Scalar], when: Any
         raise CodegenError(f"{routine.name} is a loop: it has no form in {type(ops).__name__}")
     result: list[Scalar] = method(routine, list(values), when)
     return result
-
-
-def evaluated(routine: Routine, values: Sequence[Any], when: Any = None) -> list[float]:
-    """The outputs at numbers."""
-    if when is not None and not when:
-        return [0.0] * routine.outputs
-    return [float(value) for value in routine.evaluate(np.array([float(value) for value in values]))]

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect, largest
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
+from lie_codegen.groups.maps.log_guard import off_group_square
 from lie_codegen.groups.maps.log_iterations import matrix_log, rotation_log, unitary_log
 from lie_codegen.groups.maps.log_structure import LogBlock
 from lie_codegen.groups.maps.logarithm import candidate
@@ -55,10 +56,23 @@ def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence
         return call_routine(ops, log_routine(data), flat)
     x = candidate(ops, data, entries)
     # Not `less(rounding, defect)`, which is false for NaN.
-    on_group = ops.less(defect(ops, data, entries), ops.constant(_ROUNDING))
-    off_group = ops.less(ops.where(on_group, ops.constant(-1), 0), ops.constant(-0.5))
-    checked = call_routine(ops, log_routine(data), flat, ops.where(off_group, 0, ops.constant(1)))
+    square = off_group_square(ops, data, entries)
+    if square is None:
+        on_group = ops.less(defect(ops, data, entries), ops.constant(_ROUNDING))
+    else:
+        on_group = ops.less(square, ops.constant(_ROUNDING**2))
+    off_group = ops.less(ops.where(on_group, ops.constant(1), 0), ops.constant(0.5))
+    checked = call_routine(ops, log_routine(data), flat, off_group)
     return [ops.where(on_group, closed, value) for closed, value in zip(x, checked, strict=True)]
+
+
+def far_log(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector:
+    """The logarithm of the element near X, X up to a tenth of its size from the group."""
+    entries = [list(row) for row in X]
+    if data.log_structure.is_closed:
+        return candidate(ops, data, entries)
+    flat = [part for row in entries for entry in row for part in _parts(entry, data.group.is_complex)]
+    return call_routine(ops, log_routine(data, 0.1), flat)
 
 
 def _parts(entry: Any, is_complex: bool) -> list[Scalar]:
@@ -68,9 +82,9 @@ def _parts(entry: Any, is_complex: bool) -> list[Scalar]:
     return [z.re, z.im]
 
 
-@lru_cache(maxsize=32)
-def log_routine(data: GroupDerivation) -> Routine:
-    """The checked logarithm of a group as a routine: X flat (complex entries as pairs) to x."""
+@lru_cache(maxsize=64)
+def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
+    """The checked logarithm of a group as a routine: X flat (complex entries as pairs) to x; NaN beyond `distance` from the group."""
     group, structure = data.group, data.log_structure
     d, n = group.degree, group.dim
     X, x, u = matrix_port(group, "X"), Port("x", (n,)), Port("u", (n,))
@@ -96,13 +110,14 @@ def log_routine(data: GroupDerivation) -> Routine:
         ("kinds", tuple(sorted({block.kind for block in structure.iterated}))),
         ("blocks", _Frozen(blocks)),
         ("logs_size", size),
+        ("distance", distance),
         ("constants", tuple((i, j, k, float(c)) for i, j, k, c in group.algebra.constants())),
         ("candidate_symbol", first.symbol),
         ("error_symbol", second.symbol),
     )
-    twin = _Twin(data, first, second)
+    twin = _Twin(data, first, second, distance)
     return Routine(
-        f"{group.name}_log_checked",
+        f"{group.name}_log_checked" if distance == _DISTANCE else f"{group.name}_log_far",
         d * d * (2 if group.is_complex else 1),
         n,
         "log_routine.c.jinja",
@@ -192,14 +207,16 @@ def _tangent(data: GroupDerivation) -> Any:
 class _Twin:
     """The routine in NumPy."""
 
-    def __init__(self, data: GroupDerivation, first: Kernel, second: Kernel) -> None:
+    def __init__(self, data: GroupDerivation, first: Kernel, second: Kernel, distance: float) -> None:
         self.data = data
+        self.distance = distance
         self.first = first
         self.second = second
         self.ops = FloatArithmetic()
 
-    def __call__(self, flat: Array) -> Array:
+    def __call__(self, values: Sequence[float]) -> Array:
         group = self.data.group
+        flat = np.array(values, dtype=np.float64)
         d = group.degree
         X: NDArray[Any] = (flat[::2] + 1j * flat[1::2] if group.is_complex else flat).reshape(d, d)
         nothing = np.full(group.dim, np.nan)
@@ -257,7 +274,7 @@ class _Twin:
                 break
             x[:] = y
             u, (distance, kappa) = v, fresh
-        return bool(np.max(np.abs(u)) <= _RESIDUAL * kappa and distance <= _DISTANCE * kappa)
+        return bool(np.max(np.abs(u)) <= _RESIDUAL * kappa and distance <= self.distance * kappa)
 
 
 def right_jacobian(data: GroupDerivation, x: Array) -> Array:

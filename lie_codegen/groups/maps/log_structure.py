@@ -18,7 +18,6 @@ from lie_codegen.exact.block_structure import diagonal_blocks, is_block_diagonal
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.groups.matrix_group import MatrixGroup
 
-
 #: The entries of a 4 x 4 matrix that the closed forms of SO(4) and SO(3, 1) give.
 PLANES = ((1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2))
 

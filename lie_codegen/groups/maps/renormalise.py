@@ -20,7 +20,7 @@ from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import determinant
 from lie_codegen.groups.maps.exponential import exp_matrix
-from lie_codegen.groups.maps.log_routine import log_coordinates
+from lie_codegen.groups.maps.log_routine import far_log
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.membership import Form, Membership, blocks_suffice, membership
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -50,7 +50,7 @@ def renormalised(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[An
     blocks = [block for block, _ in data.real.blocks if len(block) > 1]
     forms = conditions.forms
     if conditions.normaliser:
-        return exp_matrix(ops, data, log_coordinates(ops, data, [list(row) for row in X]))
+        return exp_matrix(ops, data, far_log(ops, data, X))
     if not forms:
         pass
     elif _all_orthogonal(data) and blocks_suffice(data.group, scaled=False):
@@ -68,7 +68,7 @@ def renormalised(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[An
             star = matmul(constant_matrix(ops, S), matmul(transpose(element), inverse))
         element = _corrected(ops, element, matmul(star, element), 1)
     else:
-        return exp_matrix(ops, data, log_coordinates(ops, data, [list(row) for row in X]))
+        return exp_matrix(ops, data, far_log(ops, data, X))
     return _of_determinant_one(ops, data, conditions, matrices.write(element))
 
 

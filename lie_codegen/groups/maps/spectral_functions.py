@@ -1,4 +1,4 @@
-"""exp, log and the Jacobians where no closed form is known: scalar arithmetic modulo the characteristic polynomial.
+"""exp and its Jacobians where no closed form is known: scalar arithmetic modulo the characteristic polynomial.
 
 By Cayley and Hamilton f(A) = sum_i c_i A^i with fewer terms than A has rows, and where eigenvalues come in pairs +-lambda
 (so(n), so(p, q), sp(n), ad of a semisimple algebra) the even and the odd part of f are polynomials in A^2 of half that degree.
@@ -7,8 +7,6 @@ The c_i follow from f modulo the characteristic polynomial, whose coefficients f
 
 exp and its Jacobian: Taylor polynomials after scaling, then doubling. Measured on so4, su3, sl3, so31, sp4, sim3: 2e-15 relative
      for eigenvalues (of ad for the Jacobian) up to 6 in modulus, 2e-14 up to 10.
-log: A = S g(V), S = (X - X^{-1})/2 = sinh A, V = (X + X^{-1})/2 - 1 = cosh A - 1, g(cosh t - 1) = t / sinh t by four halvings of
-     t. For eigenvalues a + i b the error grows like (1 + cos b)^-2: 1e-15 at b = 1, up to 4e-12 at b = 3, no digits at the cut pi.
 """
 
 from __future__ import annotations
@@ -24,13 +22,11 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import add, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.cotangent import four_pi_squared, taylor
-from lie_codegen.kernel.linear import Matrix, identity, matadd, matmul, scaled
+from lie_codegen.kernel.linear import Matrix, identity, matadd
 
 _HALVINGS = 4
 _EVEN_TERMS = 11
 _EXP_TERMS = 16
-_LOG_TERMS = 13
-_ROOT_STEPS = (10, 6, 5, 4)
 _POLES = 3
 _REMAINDER_TERMS = 18
 
@@ -98,31 +94,6 @@ def inverse_jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, rel
     total[0] = add(total[0], 1)
     half = ops.constant(Fraction(-sign, 2))
     return matadd(matrix_value(ops, total, powers, relation), ad, half)
-
-
-def logarithm(
-    ops: Arithmetic, X: Matrix, X_inverse: Matrix, even: EvenSpectrum | None, relation: Relation, *, unitary: bool
-) -> Matrix:
-    """log(X) from X and its inverse."""
-    half = ops.constant(Fraction(1, 2))
-    S = [scaled(half, row) for row in matadd(X, X_inverse, -1)]
-    V = matadd([scaled(half, row) for row in matadd(X, X_inverse)], identity(len(X)), -1)
-    if even is not None:
-        # S annihilates an eigenvalue zero without Jordan blocks, which therefore needs no factor.
-        ring, powers = even_ring(ops, V, EvenSpectrum(even.pairs, even.multiplicity, even.zero_is_defective), relation)
-    else:
-        ring, powers = _plain_ring(ops, V, traceless=False, real=unitary)
-    v = [0, 1] + [0] * (ring.r - 2) if ring.r > 1 else ring.shifted([1])
-    divisor = ring.constant(1)
-    for steps in _ROOT_STEPS:
-        y = ring.scaled(half, v)
-        y[0] = add(y[0], 1)
-        cosh = ring.square_root(y, steps)
-        divisor = ring.times(divisor, cosh)
-        v = [add(cosh[0], -1), *cosh[1:]]
-    series = [Fraction((-2) ** j * factorial(j) ** 2, factorial(2 * j + 1)) for j in range(_LOG_TERMS)]
-    g = ring.times(ring.compose(series, v), ring.inverse(divisor))
-    return matmul(S, matrix_value(ops, g, powers))
 
 
 def even_ring(ops: Arithmetic, B: Matrix, even: EvenSpectrum, relation: Relation) -> tuple[QuotientRing, list[Matrix]]:
