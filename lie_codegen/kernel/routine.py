@@ -32,6 +32,8 @@ Tangent = Callable[[Arithmetic, Sequence[Scalar], Sequence[Scalar], Sequence[Sca
 class Routine:
     """A function from doubles to doubles.
 
+    Two routines of equal name and settings are equal: the settings say all that their helpers and their twin depend on.
+
     Attributes:
         name: C identifier, unique to its settings.
         inputs, outputs: numbers of doubles.
@@ -47,7 +49,7 @@ class Routine:
     outputs: int
     template: str
     settings: tuple[tuple[str, Any], ...]
-    helpers: tuple[Kernel, ...]
+    helpers: tuple[Kernel, ...] = field(compare=False)
     evaluate: Callable[[Sequence[float]], Sequence[float] | Array] = field(compare=False)
     tangent: Tangent = field(compare=False)
 

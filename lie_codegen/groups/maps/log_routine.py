@@ -104,6 +104,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         blocks.append({"kind": block.kind, "indices": block.indices, "special": block.special, "start": start})
         start += len(block.rows)
     settings = (
+        ("definition", group.definition),
         ("degree", d),
         ("dim", n),
         ("is_complex", group.is_complex),

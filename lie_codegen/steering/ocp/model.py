@@ -21,7 +21,7 @@ import casadi as ca
 
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.logarithm import log_coordinates
+from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.rkmk import bracket_body, hat_body
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
