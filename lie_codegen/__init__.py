@@ -53,6 +53,7 @@ _FRONT_DOOR = {
     "Position": "lie_codegen.steering.goals",
     "Coset": "lie_codegen.steering.goals",
     "UpToPhase": "lie_codegen.steering.goals",
+    "qutip_evolution": "lie_codegen.steering.qutip_export",
     "ocp": "lie_codegen.steering.ocp.front",
     "mpc": "lie_codegen.steering.ocp.mpc",
     "Cone": "lie_codegen.steering.constraints",

@@ -29,7 +29,7 @@ ALLOWED = {
     "dask": {"studies", "benchmarks"},
     "rockit": {"benchmarks"},
     "crocoddyl": {"benchmarks"},
-    "qutip": {"benchmarks"},
+    "qutip": {"benchmarks", "steering"},
     "qutip_qtrl": {"benchmarks"},
     "mpmath": {"gallery"},
     "matplotlib": {"pictures", "gallery"},

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import shutil
+import subprocess
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -13,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
+from lie_codegen.codegen.templates import template_folder
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.chain import end as chain_end
 from lie_codegen.steering.direct.compiled import machine
@@ -272,3 +275,16 @@ def test_to_reach_alone_is_an_objective_too() -> None:
     assert plan.error < 1e-9
     assert plan.details["objective"] == "none"
     assert plan.cost > 2.89735
+
+
+@pytest.mark.parametrize("flags", [("-DLIE_CODEGEN_ONE_LANE", "-Wconversion", "-Wno-sign-conversion"), ("-Wno-psabi",)])
+def test_the_core_is_clean_c99_with_lanes_and_without(flags: tuple[str, ...], tmp_path: Any) -> None:
+    compiler = shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        pytest.skip("no compiler")
+    (tmp_path / "direct_sizes.h").write_text("#define PARTS 2\nenum { D = 4, N = 15, M = 4 };\n")
+    core = template_folder() / "direct_core.c"
+    strict = ("-std=c99", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-c", "-O1")
+    command = (compiler, *strict, *flags, f"-I{tmp_path}", str(core), "-o", str(tmp_path / "core.o"))
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -114,3 +114,22 @@ def test_a_robust_flip_serves_every_system_of_the_spread() -> None:
     assert worst < 7e-3
     with pytest.raises(lc.errors.ShapeError, match="gain"):
         lc.steer(su2, -1j * SX, ("sx", "sy"), 8.0, bounds=1, spread=[{"gain": (1, 2, 3)}])
+
+
+CAR = [(1, 1), (0, 1), (-1, 1), (1, -1), (0, -1), (-1, -1)]
+
+
+@pytest.mark.parametrize(("goal", "least"), [((0, 0, np.pi), np.pi), ((-1, 0, 0), 1.0), ((0, 0, 0.5), 0.5)])
+def test_reeds_and_shepps_car_turns_in_three_arcs(goal: tuple[float, float, float], least: float) -> None:
+    plan = lc.steer(lc.group("se2"), pose(*goal), ("omega", "vx"), 3.0, objective="time", vertices=CAR, bounds=1)
+    assert plan.duration == pytest.approx(least, abs=1e-6)
+
+
+def test_reeds_and_shepps_car_drives_mirrored_ways_in_the_same_time() -> None:
+    # reflections of time and of the plane: exact symmetries of the shortest ways
+    x, y, angle = 0.7, -0.4, 1.9
+    times = [
+        lc.steer(lc.group("se2"), pose(*goal), ("omega", "vx"), 3.0, objective="time", vertices=CAR, bounds=1).duration
+        for goal in ((x, y, angle), (-x, y, -angle), (x, -y, -angle))
+    ]
+    assert times == pytest.approx([times[0]] * 3, rel=1e-4)

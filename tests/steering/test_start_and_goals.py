@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -73,3 +75,11 @@ def test_feedback_goes_on_where_the_planner_refuses_what_is_left(planner: str) -
             step_options={"p": 1},
             planner=planner,
         )
+
+
+def test_the_python_of_the_guide_runs() -> None:
+    guide = Path(lc.__file__).parent / "steering" / "README.md"
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL):
+        exec(compile(block, str(guide), "exec"), names)
+    assert "pulse" in names

@@ -15,7 +15,7 @@ from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.plan import Plan
 
 #: Options that no other method has.
-_OWN = {"equation", "spread", "rounds", "pieces", "iterations", "seed", "polish"}
+_OWN = {"equation", "spread", "rounds", "pieces", "iterations", "seed", "polish", "vertices"}
 #: Options with which "auto" is surer by reaching first.
 _SURER = {"bounds", "drift"}
 
@@ -34,6 +34,8 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
     if not given & _SURER or not given <= _options():
         return False
     objective = options.get("objective", "energy")
+    if objective == "time" and options.get("vertices") is not None:
+        return True
     return objective == "energy" or (objective == "time" and _bounded(options.get("bounds"), controls))
 
 

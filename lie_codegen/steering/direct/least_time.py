@@ -15,9 +15,9 @@ from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.errors import NotFiniteError, ShapeError, SteeringError, SteeringInputError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
 from lie_codegen.steering.direct.compiled import machine
@@ -38,6 +38,8 @@ _EACH, _MOST_LANES = 2, 4096
 #: Arcs of a long word, in units of the group's dimension.
 _LONG = 3
 _KEPT = 64
+#: The shortest words, which are descended again to the last digits.
+_SHARPENED = 8
 _GONE = 1e-9
 _AGREEING = 1e-3
 #: Starts that must agree on the shortest before another round is not tried.
@@ -55,6 +57,7 @@ def least_time(
     seed: int,
     longest: float,
     say: Callable[[str], None],
+    vertices: ArrayLike | None = None,
 ) -> Plan:
     """The plan of least duration found; `task.duration` is the unit of the first guesses, and of `longest`.
 
@@ -63,7 +66,7 @@ def least_time(
         SteeringError: no word of arcs was found that reaches the goal.
     """
     began = time.perf_counter()
-    letters, velocities = _letters(task)
+    letters, velocities = _letters(task, vertices)
     solver = machine(task.system.group, 1)
     arcs = replace(task, low=np.zeros(1), high=np.ones(1), weights=np.ones(1))
     limits = _limits(task, velocities, longest)
@@ -75,6 +78,7 @@ def least_time(
         rng = np.random.default_rng([seed, round_, 11])
         long = _LONG * n * (1 + round_)
         bangs = np.flatnonzero(np.all(letters != 0, axis=1))
+        bangs = bangs if len(bangs) > 1 else np.arange(len(letters))
         for name, words in (
             ("short words", _short_words(len(letters), n, starts, rng)),
             ("long words", _long_words(len(letters), long, 4 * starts, rng)),
@@ -98,6 +102,11 @@ def least_time(
             f"the given duration, from {total} starts ({rounds} rounds, seed {seed}), which proves nothing; more starts, another seed, "
             "a larger `longest`"
         )
+    best = [
+        *(_sharpened(arcs, solver, velocities, limits, each, settings, longest) for each in best[:_SHARPENED]),
+        *best[_SHARPENED:],
+    ]
+    best.sort(key=lambda each: each[0])
     for _, word, durations, variant in best[:_KEPT]:
         flown, sequence = _flown(task, letters, word, durations, variant)
         if flown.miss <= max(1e-9, 1e-2 * tolerance):
@@ -120,13 +129,15 @@ def least_time(
     return plan_of(task, target, flown, variant, tolerance, "time", details, {"solve": time.perf_counter() - began})
 
 
-def _letters(task: Manoeuvre) -> tuple[Array, Array]:
-    """(L, m) controls at a bound or zero, and hat of the velocities they make in the unit of the given duration (L, d, d)."""
+def _letters(task: Manoeuvre, vertices: ArrayLike | None) -> tuple[Array, Array]:
+    """(L, m) controls at a bound or zero, or those given, and hat of the velocities they make in the unit of the given duration (L, d, d)."""
     name = task.system.group.name
     if not task.system.steady:
         raise SteeringInputError(
             f'steer({name}): objective="time" needs controls and a drift that do not depend on time'
         )
+    if vertices is not None:
+        return _given(task, vertices)
     unbounded = [
         label for label, a, b in zip(task.system.labels, task.low, task.high, strict=True) if not np.isfinite(b - a)
     ]
@@ -137,7 +148,25 @@ def _letters(task: Manoeuvre) -> tuple[Array, Array]:
             f'steer({name}): objective="time" takes at most {MOST_CONTROLS} controls, got {task.controls}'
         )
     choices = [(a, 0.0, b) if a < 0 < b else (a, b) for a, b in zip(task.low, task.high, strict=True)]
-    letters = np.array(list(product(*choices)))
+    return _moving(task, np.array(list(product(*choices))))
+
+
+def _given(task: Manoeuvre, vertices: ArrayLike) -> tuple[Array, Array]:
+    """The caller's own control vectors, within the bounds."""
+    name, m = task.system.group.name, task.controls
+    letters = np.array(vertices, dtype=float)
+    if letters.ndim != 2 or letters.shape[1] != m or not len(letters):
+        raise ShapeError(
+            f"steer({name}): vertices have shape {letters.shape}; give (k, {m}), a vector of controls for each arc"
+        )
+    if not np.all(np.isfinite(letters)):
+        raise NotFiniteError(f"steer({name}): vertices hold NaN or infinity")
+    if np.any(letters < task.low - 1e-12) or np.any(letters > task.high + 1e-12):
+        raise SteeringInputError(f"steer({name}): a vertex breaks the bounds")
+    return _moving(task, letters)
+
+
+def _moving(task: Manoeuvre, letters: Array) -> tuple[Array, Array]:
     velocities = task.system.group.hat(task.duration * task.system.velocity(np.zeros(len(letters)), letters))
     moving = np.max(np.abs(velocities), axis=(1, 2)) > 0
     return letters[moving], velocities[moving]
@@ -215,6 +244,26 @@ def _solve(
         if size <= threshold(arcs, settings) and np.sum(arcs.own(durations)) <= longest:
             results.append((float(np.sum(arcs.own(durations))), word, durations, int(variant[number])))
     return results
+
+
+def _sharpened(
+    arcs: Manoeuvre,
+    solver: Machine,
+    velocities: Array,
+    limits: Array,
+    candidate: tuple[float, Array, Array, int],
+    settings: Settings,
+    longest: float,
+) -> tuple[float, Array, Array, int]:
+    """The candidate, descended on its own word until nothing is gained."""
+    total, word, u, variant = candidate
+    fine = replace(settings, relative=1e-14, descend_iterations=2 * settings.descend_iterations)
+    programme = _words_programme(arcs, velocities, word[None], longest)
+    lower = solver.descend(programme, arcs.goal(np.array([variant])), u[None], fine)
+    shorter, durations, size = _tidied(arcs, solver, velocities, limits, word, lower.u[0], variant, settings, longest)
+    now = float(np.sum(arcs.own(durations)))
+    better = size <= threshold(arcs, settings) and now < total
+    return (now, shorter, durations, variant) if better else candidate
 
 
 def _words_programme(arcs: Manoeuvre, velocities: Array, words: Array, longest: float) -> Programme:

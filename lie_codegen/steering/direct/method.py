@@ -61,6 +61,7 @@ def direct(
     seed: int = 0,
     polish: bool = True,
     longest: float = 20.0,
+    vertices: ArrayLike | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Least energy, fuel or time within bounds, from many starts.
@@ -84,6 +85,8 @@ def direct(
         seed: of the guesses; the same seed, the same answer.
         polish: whether the controls become continuous (energy); else they stay constant on each piece.
         longest: for "time": the longest duration allowed, in units of the given one.
+        vertices: for "time": the (k, m) control vectors that arcs take, where the controls are not free in a box: (omega, v) = (+-1, +-1),
+            (0, +-1) is the car of Reeds and Shepp, whose turning rate is bounded by its speed. Box vertices and zeros if not given.
         progress: called with one line a stage.
 
     Raises:
@@ -98,7 +101,7 @@ def direct(
     task = manoeuvre(group, target, controls, duration, drift, bounds, weights, start, equation)
     if objective == "time":
         limits = Settings(True, iterations, iterations)
-        return least_time(task, target, tolerance, limits, starts, rounds, seed, longest, say)
+        return least_time(task, target, tolerance, limits, starts, rounds, seed, longest, say, vertices)
     count = _pieces(task) if pieces is None else pieces
     if spread is not None:
         guesses = guessed(task, guess, count)

@@ -1,0 +1,29 @@
+"""Plans as QuTiP objects: QuTiP's own solver ends at the gate; refusals without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lie_codegen as lc
+
+HADAMARD = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
+
+
+@pytest.mark.parametrize("equation", ["left", "right"])
+@pytest.mark.parametrize("polish", [True, False])
+def test_qutip_solves_the_plan_to_its_gate(equation: str, polish: bool) -> None:
+    qutip = pytest.importorskip("qutip")
+    plan = lc.steer(
+        lc.pauli(1), lc.UpToPhase(HADAMARD), ("X", "Y"), 6.0, drift={"Z": 1}, bounds=1, equation=equation, polish=polish
+    )
+    H, times = lc.qutip_evolution(plan)
+    options = {"atol": 1e-10, "rtol": 1e-9, "nsteps": 100_000, "max_step": 0.01}
+    U = qutip.sesolve(H, qutip.qeye(2), times, options=options).states[-1].full()
+    assert abs(np.trace(U.conj().T @ HADAMARD)) / 2 == pytest.approx(1, abs=1e-6)
+
+
+def test_plans_of_rotations_are_refused() -> None:
+    plan = lc.steer(lc.group("so3"), (0.1, 0.2, 0.3), ("w1", "w2"), 1.0, method="direct")
+    with pytest.raises(lc.errors.SteeringInputError, match="unitary"):
+        lc.qutip_evolution(plan)
