@@ -24,6 +24,7 @@ _FRONT_DOOR = {
     "structure": "lie_codegen.groups.structure",
     "wei_norman": "lie_codegen.groups.wei_norman.matrix",
     "wei_norman_order": "lie_codegen.groups.wei_norman.order",
+    "cartan_involution": "lie_codegen.groups.cartan",
     "chart_domain": "lie_codegen.groups.wei_norman.chart_domain",
     "controllability": "lie_codegen.groups.controllability",
     "tangent_to": "lie_codegen.groups.conventions",

@@ -87,6 +87,19 @@ def field_elements(values: Sequence[Number]) -> tuple[Any, list[Any]]:
     return domain, list(elements)
 
 
+def is_positive_definite(form: DomainMatrix) -> bool:
+    """Whether every pivot of the elimination without exchanges is positive (Sylvester), for a symmetric matrix."""
+    domain = form.domain
+    rows = [list(row) for row in form.to_dense().rep.to_ddm()]
+    for k, pivot_row in enumerate(rows):
+        if not domain.to_sympy(pivot_row[k]) > 0:
+            return False
+        for i in range(k + 1, len(rows)):
+            factor = rows[i][k] / pivot_row[k]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], pivot_row, strict=True)]
+    return True
+
+
 def to_numbers(matrix: DomainMatrix) -> list[list[Number]]:
     """The entries as SymPy numbers."""
     domain = matrix.domain

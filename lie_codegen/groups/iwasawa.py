@@ -1,7 +1,7 @@
 """Iwasawa decomposition of the semisimple part of a group: s = k + a + n, exact.
 
-The Cartan involution is theta(X) = -X^H in the group's own matrices, which is one if the algebra is closed under the
-conjugate transpose. k are its fixed points, a is a maximal abelian subspace of -1, n the sum of root spaces that are
+The Cartan involution is theta(X) = -X^H in the group's own matrices where the algebra is closed under the conjugate
+transpose; elsewhere it is found from the brackets (`algebra.cartan`), so that no verdict depends on the representation. k are its fixed points, a is a maximal abelian subspace of -1, n the sum of root spaces that are
 positive on a. G = K A N then holds globally; K compact, A N solvable (Knapp, Lie Groups Beyond an Introduction, VI.4).
 """
 
@@ -12,10 +12,13 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from lie_codegen.algebra.cartan import cartan_involution_of
 from lie_codegen.algebra.ideal_chain import adapted_basis
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.subspace import Subspace, Vector, annihilated, bracket, span
+from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
+from lie_codegen.groups.cartan import restricted_to
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 
@@ -63,17 +66,20 @@ def _matrix(group: MatrixGroup, x: Vector) -> sp.Matrix:
 
 
 def _cartan_involution(group: MatrixGroup, semisimple: Subspace) -> sp.Matrix | None:
-    """theta on the coordinates along the given vectors."""
+    """theta on the coordinates along the given vectors: -X^H where that is one, else from the brackets where it is rational."""
     matrices = [_matrix(group, vector) for vector in semisimple]
     size = len(matrices)
     own = [real_coordinates(matrix) for matrix in matrices]
     images = [real_coordinates(-matrix.H) for matrix in matrices]
     table = [list(row) for row in zip(*own, *images, strict=True)]
     reduced, pivots = domain_matrix(table).rref()
-    if tuple(pivots) != tuple(range(size)):
+    if tuple(pivots) == tuple(range(size)):
+        rows = to_numbers(reduced)[:size]
+        return sp.Matrix([row[size:] for row in rows])
+    try:
+        return cartan_involution_of(restricted_to(group.algebra, semisimple)).exact
+    except AlgebraError:
         return None
-    rows = to_numbers(reduced)[:size]
-    return sp.Matrix([row[size:] for row in rows])
 
 
 def _maximal_abelian(algebra: LieAlgebra, p: Subspace) -> tuple[Vector, ...]:

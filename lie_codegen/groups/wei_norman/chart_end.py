@@ -5,7 +5,8 @@ order alone:
 
 1. Peeling. If an end of the list is a solvable ideal in chain order (`ideal_chain`) and the rest a subalgebra, or an end is
    one element and the rest an ideal, then the coordinates of the whole last as long as those of the rest.
-2. A rest of skew-Hermitian matrices: all exponentials are unitary, |M| <= C / |det M^{-1}|, so the chart ends at walls only.
+2. A rest that is a compact algebra (its radical is central and its Killing form negative elsewhere): its adjoint group is
+   bounded, |M| <= C / |det M^{-1}|, so the chart ends at walls only. This is a fact of the brackets, not of the matrices.
 3. A rest K S or S K with K compact and S solvable in chain order, such as Iwasawa's K A N: then G = K S, S is global, and
    the chart ends where that of K does; never, if K is abelian.
 """
@@ -17,11 +18,12 @@ from typing import Literal
 
 import sympy as sp
 
+from lie_codegen.algebra.cartan import is_maximal_compact
 from lie_codegen.algebra.ideal_chain import is_chain_order, is_ideal, is_subalgebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.structure import structure
-from lie_codegen.algebra.subspace import span, unit
-from lie_codegen.exact.numbers import Number
+from lie_codegen.algebra.subspace import brackets, whole
+from lie_codegen.exact.numbers import Number, domain_matrix, is_positive_definite
 from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -38,10 +40,10 @@ def chart_end(group: MatrixGroup, has_walls: bool) -> tuple[End, str]:
     outside = "" if len(rest) == group.dim else "the other elements extend the chart by quadratures (chain of ideals); "
     if not rest:
         return "never", "the basis is in the order of a chain of ideals, so the equations are a cascade of quadratures"
-    if _skew(group, rest):
+    if is_compact(restricted(algebra, rest)):
         return (
             "walls",
-            f"{outside}{names} are skew-Hermitian, so M is bounded by 1 / |det M^-1|: no escape before a wall",
+            f"{outside}{names} span a compact algebra, so M is bounded by 1 / |det M^-1|: no escape before a wall",
         )
     for compact, solvable in _splittings(rest):
         if _is_compact_times_solvable(group, rest, compact, solvable):
@@ -84,8 +86,16 @@ def _is_chain(algebra: LieAlgebra, part: Sequence[int]) -> bool:
     return is_subalgebra(algebra, part) and is_chain_order(algebra, part)
 
 
-def _skew(group: MatrixGroup, part: Sequence[int]) -> bool:
-    return all((group.exact_basis[i] + group.exact_basis[i].H).is_zero_matrix for i in part)
+def is_compact(algebra: LieAlgebra) -> bool:
+    """Whether an invariant scalar product exists: the radical is the centre, and the Killing form negative on [g, g]."""
+    parts = structure(algebra)
+    if not parts.reductive:
+        return False
+    derived = sp.Matrix([list(vector) for vector in brackets(algebra, whole(algebra), whole(algebra))])
+    if not derived.rows:
+        return True
+    form = domain_matrix((-derived * sp.Matrix(parts.killing) * derived.T).tolist())
+    return is_positive_definite(form)
 
 
 def _splittings(rest: list[int]) -> list[tuple[list[int], list[int]]]:
@@ -98,18 +108,19 @@ def _is_compact_times_solvable(
     group: MatrixGroup, rest: Sequence[int], compact: Sequence[int], solvable: Sequence[int]
 ) -> bool:
     algebra = group.algebra
-    if not (_skew(group, compact) and is_subalgebra(algebra, compact) and _is_chain(algebra, solvable)):
+    if not (is_subalgebra(algebra, compact) and _is_chain(algebra, solvable)):
         return False
-    if structure(restricted(algebra, compact)).semisimple:
+    own = restricted(algebra, compact)
+    if structure(own).semisimple and is_compact(own):
         return True
-    if not structure(restricted(algebra, rest)).semisimple:
-        return False
-    decomposition = iwasawa(group, span(unit(algebra, i) for i in rest))
-    return decomposition is not None and span(decomposition.k) == span(unit(algebra, i) for i in compact)
+    inside = [rest.index(i) for i in compact]
+    return is_maximal_compact(restricted(algebra, rest), inside)
 
 
 def restricted(algebra: LieAlgebra, part: Sequence[int]) -> LieAlgebra:
     """The subalgebra spanned by some basis elements."""
+    if list(part) == list(range(algebra.dim)):
+        return algebra
     place = {old: new for new, old in enumerate(part)}
     table: dict[tuple[int, int], dict[int, sp.Expr]] = {}
     for (i, j), row in algebra.table.items():

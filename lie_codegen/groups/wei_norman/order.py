@@ -10,17 +10,21 @@ import sympy as sp
 
 from lie_codegen.algebra.ideal_chain import adapted_basis, chain_order, is_ideal, is_subalgebra
 from lie_codegen.algebra.structure import structure
-from lie_codegen.algebra.subspace import Vector
+from lie_codegen.algebra.subspace import Subspace, Vector
 from lie_codegen.exact.numbers import Number
+from lie_codegen.groups.cartan import restricted_to
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.chart_domain import ChartDomain, chart_domain
-from lie_codegen.groups.wei_norman.chart_end import combination_text
+from lie_codegen.groups.wei_norman.chart_domain import ChartDomain, chart_domain, is_generic
+from lie_codegen.groups.wei_norman.chart_end import combination_text, is_compact
 
 _RANK = {"never": 0, "walls": 1, "either": 2, "escape": 3}
 #: Up to this dimension every order is tried.
 _ALL_ORDERS = 4
+_LONGEST = 2000
+#: dim so(3)
+_ROTATIONS = 3
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class WeiNormanOrder:
         change_of_basis: {new label: {label: coefficient}} of a basis with a better chart, None where none was found; give it
             to `lc.change_of_basis`.
         changed_group, changed_domain: the group in that basis and its chart, None without one.
-        reason: why, in words.
+        reason: why, in words, at most 2,000 characters.
+        truncated: whether a determinant was not expanded, or the reason cut, because the basis is generic.
     """
 
     labels: tuple[str, ...]
@@ -44,6 +49,7 @@ class WeiNormanOrder:
     changed_group: MatrixGroup | None
     changed_domain: ChartDomain | None
     reason: str
+    truncated: bool = False
 
     @property
     def determinant(self) -> sp.Expr:
@@ -70,15 +76,19 @@ def wei_norman_order(group: MatrixGroup) -> WeiNormanOrder:
             break
         other = group.reorder(order)
         found = chart_domain(other)
-        if _score(found) < _score(domain):
+        # A wall is a place where every solution that gets there ends; an escape may never happen: no walls for none.
+        if _score(found) < _score(domain) and (domain.walls == found.walls == () or domain.walls):
             best, domain = other, found
     combinations = None if domain.is_global else _adapted_combinations(group)
     changed = change_of_basis(group, combinations) if combinations else None
-    changed_domain = chart_domain(changed) if changed else None
-    if changed_domain is None or _RANK[changed_domain.end] >= _RANK[domain.end]:
+    changed_domain = chart_domain(changed) if changed and not is_generic(changed.algebra) else None
+    truncated = domain.truncated
+    if changed_domain is None or (not truncated and _RANK[changed_domain.end] >= _RANK[domain.end]):
         combinations = changed = changed_domain = None
     reason = _reason(group, best, domain, combinations, changed_domain)
-    return WeiNormanOrder(best.labels, best, domain, combinations, changed, changed_domain, reason)
+    if len(reason) > _LONGEST:
+        reason, truncated = reason[: _LONGEST - 4] + " ...", True
+    return WeiNormanOrder(best.labels, best, domain, combinations, changed, changed_domain, reason, truncated)
 
 
 def _score(domain: ChartDomain) -> tuple[int, int, int]:
@@ -89,6 +99,8 @@ def _score(domain: ChartDomain) -> tuple[int, int, int]:
 
 def _candidates(group: MatrixGroup) -> Iterator[tuple[str, ...]]:
     algebra = group.algebra
+    if is_generic(algebra):
+        return
     everything = list(range(group.dim))
     whole = chain_order(algebra, everything)
     if whole is not None:
@@ -127,8 +139,8 @@ def _adapted_combinations(group: MatrixGroup) -> dict[str, dict[str, Number]] | 
     if parts.levi:
         decomposition = iwasawa(group, parts.levi)
         blocks += (
-            [("s", parts.levi)]
-            if decomposition is None
+            [("s", _orthogonal(group, parts.levi))]
+            if decomposition is None or not decomposition.n
             else [("k", decomposition.k), ("a", decomposition.a), ("n", decomposition.n)]
         )
     blocks.append(("r", adapted_basis(group.algebra, parts.radical)))
@@ -141,6 +153,25 @@ def _adapted_combinations(group: MatrixGroup) -> dict[str, dict[str, Number]] | 
             combinations[label] = {group.labels[i]: value for i, value in enumerate(vector) if value != 0}
             taken.add(label)
     return combinations if len(combinations) == group.dim else None
+
+
+def _orthogonal(group: MatrixGroup, levi: Subspace) -> tuple[Vector, ...]:
+    """An so(3) in a basis orthogonal for the Killing form, not normalised, so that it stays rational: two of its elements
+    then have their bracket along the third, and the chart has one wall. Others as they are."""
+    if len(levi) != _ROTATIONS:
+        return levi
+    own = restricted_to(group.algebra, levi)
+    if not is_compact(own):
+        return levi
+    form = -sp.Matrix(structure(own).killing)
+    chosen: list[sp.Matrix] = []
+    for i in range(own.dim):
+        row = sp.Matrix([[int(i == k) for k in range(own.dim)]])
+        for other in chosen:
+            row = row - other * ((row * form * other.T)[0] / (other * form * other.T)[0])
+        chosen.append(row)
+    basis = sp.Matrix([list(vector) for vector in levi])
+    return tuple(tuple(row * basis) for row in chosen)
 
 
 def _free(letter: str, number: int, count: int, taken: set[str]) -> str:
