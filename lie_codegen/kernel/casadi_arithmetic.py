@@ -101,13 +101,15 @@ class _RoutineFunction(ca.Callback):
 
 _FUNCTIONS: dict[Routine, _RoutineFunction] = {}
 _NUMBERS: dict[Routine, float] = {}
+#: A number that no formula holds: were it one of its constants, the printed C would depend on what was derived before.
+_FIRST_NUMBER = -(2.0**52)
 _LOCK = threading.Lock()
 
 
 def _called(routine: Routine) -> _RoutineFunction:
     with _LOCK:
         if routine not in _FUNCTIONS:
-            _NUMBERS[routine] = float(len(_NUMBERS) + 1)
+            _NUMBERS[routine] = _FIRST_NUMBER + len(_NUMBERS)
             _FUNCTIONS[routine] = _RoutineFunction(routine)
         return _FUNCTIONS[routine]
 

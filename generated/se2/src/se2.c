@@ -4,6 +4,414 @@
 
 #include <math.h>
 
+static void se2_log_candidate(const double X[9], double x[3])
+{
+    const double t0 = X[0];
+    const double t1 = X[1];
+    const double t2 = X[2];
+    const double t3 = X[3];
+    const double t4 = X[4];
+    const double t5 = X[5];
+    const double t6 = t3 - t1;
+    const double t8 = t6 / 2.0;
+    const double t9 = t0 + t4;
+    const double t10 = t9 / 2.0;
+    const double t11 = atan2(t8, t10);
+    const double t12 = t11 * t11;
+    const double t14 = (double)(t12 < 12.0);
+    const double t16 = t14 != 0.0 ? t12 : 1.0;
+    const double t18 = 39.47841760435743 - t16;
+    const double t19 = 2.0 / t18;
+    const double t37 = 8.470227328650247e-38 * t16;
+    const double t38 = (-1.3375664093215244e-35) - t37;
+    const double t39 = t38 * t16;
+    const double t40 = 2.1122063323183885e-33 - t39;
+    const double t41 = t40 * t16;
+    const double t42 = (-3.3354842988221443e-31) - t41;
+    const double t43 = t42 * t16;
+    const double t44 = 5.267262996834231e-29 - t43;
+    const double t45 = t44 * t16;
+    const double t46 = (-8.318003195189264e-27) - t45;
+    const double t47 = t46 * t16;
+    const double t48 = 1.3136241807166534e-24 - t47;
+    const double t49 = t48 * t16;
+    const double t50 = (-2.0747401878593604e-22) - t49;
+    const double t51 = t50 * t16;
+    const double t52 = 3.277539174701792e-20 - t51;
+    const double t53 = t52 * t16;
+    const double t54 = (-5.180118196169724e-18) - t53;
+    const double t55 = t54 * t16;
+    const double t56 = 8.196052055691008e-16 - t55;
+    const double t57 = t56 * t16;
+    const double t58 = (-1.3000482138698975e-13) - t57;
+    const double t59 = t58 * t16;
+    const double t60 = 2.0742872904166045e-11 - t59;
+    const double t61 = t60 * t16;
+    const double t62 = (-3.357141926657451e-09) - t61;
+    const double t63 = t62 * t16;
+    const double t64 = 5.637370282876845e-07 - t63;
+    const double t65 = t64 * t16;
+    const double t66 = (-0.000105641107053347) - t65;
+    const double t67 = t66 * t16;
+    const double t68 = 0.03267274151216445 - t67;
+    const double t69 = t19 + t68;
+    const double t70 = t16 * t69;
+    const double t71 = 1.0 - t70;
+    const double t72 = t14 != 0.0 ? 12.0 : t12;
+    const double t73 = sqrt(t72);
+    const double t74 = t73 / 2.0;
+    const double t75 = cos(t74);
+    const double t76 = sin(t74);
+    const double t77 = t74 * t75;
+    const double t78 = t77 / t76;
+    const double t79 = t14 != 0.0 ? t71 : t78;
+    const double t80 = t0 * t2;
+    const double t81 = t3 * t5;
+    const double t82 = t80 + t81;
+    const double t83 = t79 * t82;
+    const double t85 = t1 * t2;
+    const double t86 = t4 * t5;
+    const double t87 = t85 + t86;
+    const double t88 = t11 * t87;
+    const double t89 = 0.5 * t88;
+    const double t90 = t83 - t89;
+    const double t91 = t79 * t87;
+    const double t92 = t11 * t82;
+    const double t93 = 0.5 * t92;
+    const double t94 = t91 + t93;
+    x[0] = t11;
+    x[1] = t90;
+    x[2] = t94;
+}
+
+static void se2_log_error(const double x[3], const double X[9], double u[3], double error[2])
+{
+    const double t0 = x[0];
+    const double t1 = x[1];
+    const double t2 = x[2];
+    const double t3 = X[0];
+    const double t4 = X[1];
+    const double t5 = X[2];
+    const double t6 = X[3];
+    const double t7 = X[4];
+    const double t8 = X[5];
+    const double t9 = X[6];
+    const double t10 = X[7];
+    const double t11 = X[8];
+    const double t13 = t0 * t0;
+    const double t15 = (double)(t13 < 1.0);
+    const double t17 = (-4.110317623312165e-19) * t13;
+    const double t19 = t17 + 1.5619206968586225e-16;
+    const double t20 = t19 * t13;
+    const double t22 = t20 + (-4.779477332387385e-14);
+    const double t23 = t22 * t13;
+    const double t25 = t23 + 1.1470745597729725e-11;
+    const double t26 = t25 * t13;
+    const double t28 = t26 + (-2.08767569878681e-09);
+    const double t29 = t28 * t13;
+    const double t31 = t29 + 2.755731922398589e-07;
+    const double t32 = t31 * t13;
+    const double t34 = t32 + (-2.48015873015873e-05);
+    const double t35 = t34 * t13;
+    const double t37 = t35 + 0.001388888888888889;
+    const double t38 = t37 * t13;
+    const double t40 = t38 + (-0.041666666666666664);
+    const double t41 = t40 * t13;
+    const double t43 = t41 + 0.5;
+    const double t44 = t13 * t43;
+    const double t45 = 1.0 - t44;
+    const double t46 = t15 != 0.0 ? 1.0 : t13;
+    const double t47 = sqrt(t46);
+    const double t48 = cos(t47);
+    const double t49 = sin(t47);
+    const double t50 = t15 != 0.0 ? t45 : t48;
+    const double t51 = t50 * t4;
+    const double t53 = (-8.22063524662433e-18) * t13;
+    const double t55 = t53 + 2.8114572543455206e-15;
+    const double t56 = t55 * t13;
+    const double t58 = t56 + (-7.647163731819816e-13);
+    const double t59 = t58 * t13;
+    const double t61 = t59 + 1.6059043836821613e-10;
+    const double t62 = t61 * t13;
+    const double t64 = t62 + (-2.505210838544172e-08);
+    const double t65 = t64 * t13;
+    const double t67 = t65 + 2.7557319223985893e-06;
+    const double t68 = t67 * t13;
+    const double t70 = t68 + (-0.0001984126984126984);
+    const double t71 = t70 * t13;
+    const double t73 = t71 + 0.008333333333333333;
+    const double t74 = t73 * t13;
+    const double t76 = t74 + (-0.16666666666666666);
+    const double t77 = t76 * t13;
+    const double t78 = t77 + 1.0;
+    const double t79 = t49 / t47;
+    const double t80 = t15 != 0.0 ? t78 : t79;
+    const double t81 = t80 * t0;
+    const double t82 = t81 * t7;
+    const double t83 = t51 + t82;
+    const double t84 = 1.0 - t48;
+    const double t85 = t84 / t46;
+    const double t86 = t15 != 0.0 ? t43 : t85;
+    const double t87 = t0 * t2;
+    const double t88 = t86 * t87;
+    const double t89 = t80 * t1;
+    const double t90 = t88 + t89;
+    const double t91 = t90 * t10;
+    const double t92 = t83 - t91;
+    const double t93 = (-0.5) * t92;
+    const double t94 = t50 * t6;
+    const double t95 = t81 * t3;
+    const double t96 = t94 - t95;
+    const double t97 = t0 * t1;
+    const double t98 = t86 * t97;
+    const double t99 = t80 * t2;
+    const double t100 = t98 - t99;
+    const double t101 = t100 * t9;
+    const double t102 = t96 + t101;
+    const double t103 = 0.5 * t102;
+    const double t104 = t93 + t103;
+    const double t105 = t50 * t5;
+    const double t106 = t81 * t8;
+    const double t107 = t105 + t106;
+    const double t108 = t90 * t11;
+    const double t109 = t107 - t108;
+    const double t110 = t50 * t8;
+    const double t111 = t81 * t5;
+    const double t112 = t110 - t111;
+    const double t113 = t100 * t11;
+    const double t114 = t112 + t113;
+    const double t115 = t50 * t3;
+    const double t116 = t81 * t6;
+    const double t117 = t115 + t116;
+    const double t118 = t90 * t9;
+    const double t119 = t117 - t118;
+    const double t121 = t119 + (-1.0);
+    const double t122 = t121 * t121;
+    const double t123 = t92 + t104;
+    const double t124 = t123 * t123;
+    const double t125 = t122 + t124;
+    const double t126 = t102 - t104;
+    const double t127 = t126 * t126;
+    const double t128 = t125 + t127;
+    const double t129 = t50 * t7;
+    const double t130 = t81 * t4;
+    const double t131 = t129 - t130;
+    const double t132 = t100 * t10;
+    const double t133 = t131 + t132;
+    const double t134 = t133 + (-1.0);
+    const double t135 = t134 * t134;
+    const double t136 = t128 + t135;
+    const double t137 = t9 * t9;
+    const double t138 = t136 + t137;
+    const double t139 = t10 * t10;
+    const double t140 = t138 + t139;
+    const double t141 = t11 + (-1.0);
+    const double t142 = t141 * t141;
+    const double t143 = t140 + t142;
+    const double t144 = sqrt(t143);
+    const double t145 = fabs(t3);
+    const double t146 = fabs(t4);
+    const double t147 = (double)(t145 < t146);
+    const double t148 = t147 != 0.0 ? t146 : t145;
+    const double t149 = fabs(t5);
+    const double t150 = (double)(t148 < t149);
+    const double t151 = t150 != 0.0 ? t149 : t148;
+    const double t152 = fabs(t6);
+    const double t153 = (double)(t151 < t152);
+    const double t154 = t153 != 0.0 ? t152 : t151;
+    const double t155 = fabs(t7);
+    const double t156 = (double)(t154 < t155);
+    const double t157 = t156 != 0.0 ? t155 : t154;
+    const double t158 = fabs(t8);
+    const double t159 = (double)(t157 < t158);
+    const double t160 = t159 != 0.0 ? t158 : t157;
+    const double t161 = fabs(t9);
+    const double t162 = (double)(t160 < t161);
+    const double t163 = t162 != 0.0 ? t161 : t160;
+    const double t164 = fabs(t10);
+    const double t165 = (double)(t163 < t164);
+    const double t166 = t165 != 0.0 ? t164 : t163;
+    const double t167 = fabs(t11);
+    const double t168 = (double)(t166 < t167);
+    const double t169 = t168 != 0.0 ? t167 : t166;
+    const double t170 = fabs(t50);
+    const double t171 = fabs(t81);
+    const double t172 = (double)(t170 < t171);
+    const double t173 = t172 != 0.0 ? t171 : t170;
+    const double t174 = fabs(t90);
+    const double t175 = (double)(t173 < t174);
+    const double t176 = t175 != 0.0 ? t174 : t173;
+    const double t177 = (double)(t176 < t171);
+    const double t178 = t177 != 0.0 ? t171 : t176;
+    const double t179 = (double)(t178 < t170);
+    const double t180 = t179 != 0.0 ? t170 : t178;
+    const double t181 = fabs(t100);
+    const double t182 = (double)(t180 < t181);
+    const double t183 = t182 != 0.0 ? t181 : t180;
+    const double t184 = (double)(t183 < 1.0);
+    const double t185 = t184 != 0.0 ? 1.0 : t183;
+    const double t186 = t169 * t185;
+    const double t187 = (double)(1.0 < t186);
+    const double t188 = t187 != 0.0 ? t186 : 1.0;
+    u[0] = t104;
+    u[1] = t109;
+    u[2] = t114;
+    error[0] = t144;
+    error[1] = t188;
+}
+
+
+
+/* y = x + rjac_inv(x) u, rjac = (1 - e^{-ad x})/ad x: its series after scaling, doubled, then elimination. 0 where it is singular. */
+static int se2_log_checked_newton(const double *x, const double *u, double *y)
+{
+    static const int place[4][3] = {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 0, 1} };
+    static const double value[4] = {1.0, -1.0, -1.0, 1.0 };
+    double B[3][3], E[3][3], F[3][4], P[3][3], R[3][3];
+    double size = 0.0;
+    int i, j, k, step, doublings = 0;
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j) {
+            B[i][j] = 0.0;
+        }
+    }
+    for (k = 0; k < 4; ++k) {
+        B[place[k][2]][place[k][1]] -= value[k] * x[place[k][0]];
+    }
+    for (i = 0; i < 3; ++i) {
+        double sum = 0.0;
+        for (j = 0; j < 3; ++j) {
+            sum += fabs(B[i][j]);
+        }
+        size = fmax(size, sum);
+    }
+    if (!(size < 1e6)) {
+        return 0;
+    }
+    for (; size > 0.5; size /= 2.0) {
+        ++doublings;
+    }
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j) {
+            B[i][j] = ldexp(B[i][j], -doublings);
+            P[i][j] = i == j ? 1.0 : 0.0;
+            E[i][j] = P[i][j];
+            F[i][j] = P[i][j];
+        }
+    }
+    for (step = 1; step <= 14; ++step) {
+        /* P = B^k / k!; E = sum of P, F = sum of P / (k + 1). */
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                R[i][j] = 0.0;
+                for (k = 0; k < 3; ++k) {
+                    R[i][j] += P[i][k] * B[k][j];
+                }
+            }
+        }
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                P[i][j] = R[i][j] / step;
+                E[i][j] += P[i][j];
+                F[i][j] += P[i][j] / (step + 1);
+            }
+        }
+    }
+    for (step = 0; step < doublings; ++step) {
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                R[i][j] = F[i][j] / 2.0;
+                P[i][j] = 0.0;
+                for (k = 0; k < 3; ++k) {
+                    R[i][j] += F[i][k] * E[k][j] / 2.0;
+                    P[i][j] += E[i][k] * E[k][j];
+                }
+            }
+        }
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                F[i][j] = R[i][j];
+                E[i][j] = P[i][j];
+            }
+        }
+    }
+    for (i = 0; i < 3; ++i) {
+        F[i][3] = u[i];
+    }
+    for (k = 0; k < 3; ++k) {
+        int best = k;
+        for (i = k + 1; i < 3; ++i) {
+            best = fabs(F[i][k]) > fabs(F[best][k]) ? i : best;
+        }
+        if (!(fabs(F[best][k]) > 1e-13)) {
+            return 0;
+        }
+        for (j = 0; j <= 3; ++j) {
+            const double t = F[k][j];
+            F[k][j] = F[best][j];
+            F[best][j] = t;
+        }
+        for (i = 0; i < 3; ++i) {
+            const double factor = i == k ? 0.0 : F[i][k] / F[k][k];
+            for (j = k; i != k && j <= 3; ++j) {
+                F[i][j] -= factor * F[k][j];
+            }
+        }
+    }
+    for (i = 0; i < 3; ++i) {
+        y[i] = x[i] + F[i][3] / F[i][i];
+    }
+    return 1;
+}
+
+/* x is taken if exp(hat x) = X (1 + hat u) with u of the size of rounding, after Newton steps as long as u falls: the fixed point is the logarithm
+   of the nearest element. error = (distance from the group, |X| |X^-1|). */
+static int se2_log_checked_certified(const double *X, double *x)
+{
+    double u[3], error[2], size = 0.0, next;
+    int k, step;
+    se2_log_error(x, X, u, error);
+    for (k = 0; k < 3; ++k) {
+        size = fabs(u[k]) <= size ? size : fabs(u[k]);
+    }
+    for (step = 0; step < 3 && !(size <= 4e-15 * error[1]); ++step) {
+        double y[3], v[3], fresh[2];
+        if (!se2_log_checked_newton(x, u, y)) {
+            break;
+        }
+        se2_log_error(y, X, v, fresh);
+        next = 0.0;
+        for (k = 0; k < 3; ++k) {
+            next = fabs(v[k]) <= next ? next : fabs(v[k]);
+        }
+        if (!(next < size)) {
+            break;
+        }
+        for (k = 0; k < 3; ++k) {
+            x[k] = y[k];
+            u[k] = v[k];
+        }
+        error[0] = fresh[0];
+        error[1] = fresh[1];
+        size = next;
+    }
+    return size <= 1e-12 * error[1] && error[0] <= 1e-05 * error[1];
+}
+
+static void se2_log_checked(const double *X, double *x)
+{
+    int k;
+    do {
+        se2_log_candidate(X, x);
+        if (se2_log_checked_certified(X, x)) {
+            return;
+        }
+    } while (0);
+    for (k = 0; k < 3; ++k) {
+        x[k] = NAN;
+    }
+}
+
 void se2_product_exp(const double g[3], double X[9])
 {
     const double t0 = g[0];
@@ -145,76 +553,110 @@ void se2_log(const double X[9], double x[3])
     const double t3 = X[3];
     const double t4 = X[4];
     const double t5 = X[5];
-    const double t6 = t3 - t1;
-    const double t8 = t6 / 2.0;
-    const double t9 = t0 + t4;
-    const double t10 = t9 / 2.0;
-    const double t11 = atan2(t8, t10);
-    const double t12 = t11 * t11;
-    const double t14 = (double)(t12 < 12.0);
-    const double t16 = t14 != 0.0 ? t12 : 1.0;
-    const double t18 = 39.47841760435743 - t16;
-    const double t19 = 2.0 / t18;
-    const double t37 = 8.470227328650247e-38 * t16;
-    const double t38 = (-1.3375664093215244e-35) - t37;
-    const double t39 = t38 * t16;
-    const double t40 = 2.1122063323183885e-33 - t39;
-    const double t41 = t40 * t16;
-    const double t42 = (-3.3354842988221443e-31) - t41;
-    const double t43 = t42 * t16;
-    const double t44 = 5.267262996834231e-29 - t43;
-    const double t45 = t44 * t16;
-    const double t46 = (-8.318003195189264e-27) - t45;
-    const double t47 = t46 * t16;
-    const double t48 = 1.3136241807166534e-24 - t47;
-    const double t49 = t48 * t16;
-    const double t50 = (-2.0747401878593604e-22) - t49;
-    const double t51 = t50 * t16;
-    const double t52 = 3.277539174701792e-20 - t51;
-    const double t53 = t52 * t16;
-    const double t54 = (-5.180118196169724e-18) - t53;
-    const double t55 = t54 * t16;
-    const double t56 = 8.196052055691008e-16 - t55;
-    const double t57 = t56 * t16;
-    const double t58 = (-1.3000482138698975e-13) - t57;
-    const double t59 = t58 * t16;
-    const double t60 = 2.0742872904166045e-11 - t59;
-    const double t61 = t60 * t16;
-    const double t62 = (-3.357141926657451e-09) - t61;
-    const double t63 = t62 * t16;
-    const double t64 = 5.637370282876845e-07 - t63;
-    const double t65 = t64 * t16;
-    const double t66 = (-0.000105641107053347) - t65;
-    const double t67 = t66 * t16;
-    const double t68 = 0.03267274151216445 - t67;
-    const double t69 = t19 + t68;
-    const double t70 = t16 * t69;
-    const double t71 = 1.0 - t70;
-    const double t72 = t14 != 0.0 ? 12.0 : t12;
-    const double t73 = sqrt(t72);
-    const double t74 = t73 / 2.0;
-    const double t75 = cos(t74);
-    const double t76 = sin(t74);
-    const double t77 = t74 * t75;
-    const double t78 = t77 / t76;
-    const double t79 = t14 != 0.0 ? t71 : t78;
-    const double t80 = t0 * t2;
-    const double t81 = t3 * t5;
-    const double t82 = t80 + t81;
-    const double t83 = t79 * t82;
-    const double t85 = t1 * t2;
-    const double t86 = t4 * t5;
-    const double t87 = t85 + t86;
-    const double t88 = t11 * t87;
-    const double t89 = 0.5 * t88;
-    const double t90 = t83 - t89;
-    const double t91 = t79 * t87;
-    const double t92 = t11 * t82;
-    const double t93 = 0.5 * t92;
-    const double t94 = t91 + t93;
-    x[0] = t11;
-    x[1] = t90;
-    x[2] = t94;
+    const double t6 = X[6];
+    const double t7 = X[7];
+    const double t8 = X[8];
+    const double t9 = t6 * t6;
+    const double t10 = t7 * t7;
+    const double t11 = t9 + t10;
+    const double t13 = t8 + (-1.0);
+    const double t14 = t13 * t13;
+    const double t15 = t11 + t14;
+    const double t16 = t0 - t4;
+    const double t17 = t16 * t16;
+    const double t18 = t15 + t17;
+    const double t19 = t3 + t1;
+    const double t20 = t19 * t19;
+    const double t21 = t18 + t20;
+    const double t22 = t0 * t0;
+    const double t23 = t3 * t3;
+    const double t24 = t22 + t23;
+    const double t26 = t24 - 1.0;
+    const double t27 = t26 * t26;
+    const double t28 = t21 + t27;
+    const double t30 = (double)(t28 < 1e-26);
+    const double t31 = t3 - t1;
+    const double t33 = t31 / 2.0;
+    const double t34 = t0 + t4;
+    const double t35 = t34 / 2.0;
+    const double t36 = atan2(t33, t35);
+    const double t37 = t30 != 0.0 ? 1.0 : 0.0;
+    const double t39 = (double)(t37 < 0.5);
+    double t40[3] = {0.0};
+    if (t39 != 0) {
+        se2_log_checked((const double[9]){t0, t1, t2, t3, t4, t5, t6, t7, t8}, t40);
+    }
+    const double t41 = t40[0];
+    const double t42 = t40[1];
+    const double t43 = t40[2];
+    const double t44 = t30 != 0.0 ? t36 : t41;
+    const double t45 = t36 * t36;
+    const double t47 = (double)(t45 < 12.0);
+    const double t48 = t47 != 0.0 ? t45 : 1.0;
+    const double t50 = 39.47841760435743 - t48;
+    const double t51 = 2.0 / t50;
+    const double t69 = 8.470227328650247e-38 * t48;
+    const double t70 = (-1.3375664093215244e-35) - t69;
+    const double t71 = t70 * t48;
+    const double t72 = 2.1122063323183885e-33 - t71;
+    const double t73 = t72 * t48;
+    const double t74 = (-3.3354842988221443e-31) - t73;
+    const double t75 = t74 * t48;
+    const double t76 = 5.267262996834231e-29 - t75;
+    const double t77 = t76 * t48;
+    const double t78 = (-8.318003195189264e-27) - t77;
+    const double t79 = t78 * t48;
+    const double t80 = 1.3136241807166534e-24 - t79;
+    const double t81 = t80 * t48;
+    const double t82 = (-2.0747401878593604e-22) - t81;
+    const double t83 = t82 * t48;
+    const double t84 = 3.277539174701792e-20 - t83;
+    const double t85 = t84 * t48;
+    const double t86 = (-5.180118196169724e-18) - t85;
+    const double t87 = t86 * t48;
+    const double t88 = 8.196052055691008e-16 - t87;
+    const double t89 = t88 * t48;
+    const double t90 = (-1.3000482138698975e-13) - t89;
+    const double t91 = t90 * t48;
+    const double t92 = 2.0742872904166045e-11 - t91;
+    const double t93 = t92 * t48;
+    const double t94 = (-3.357141926657451e-09) - t93;
+    const double t95 = t94 * t48;
+    const double t96 = 5.637370282876845e-07 - t95;
+    const double t97 = t96 * t48;
+    const double t98 = (-0.000105641107053347) - t97;
+    const double t99 = t98 * t48;
+    const double t100 = 0.03267274151216445 - t99;
+    const double t101 = t51 + t100;
+    const double t102 = t48 * t101;
+    const double t103 = 1.0 - t102;
+    const double t104 = t47 != 0.0 ? 12.0 : t45;
+    const double t105 = sqrt(t104);
+    const double t106 = t105 / 2.0;
+    const double t107 = cos(t106);
+    const double t108 = sin(t106);
+    const double t109 = t106 * t107;
+    const double t110 = t109 / t108;
+    const double t111 = t47 != 0.0 ? t103 : t110;
+    const double t112 = t0 * t2;
+    const double t113 = t3 * t5;
+    const double t114 = t112 + t113;
+    const double t115 = t111 * t114;
+    const double t116 = t1 * t2;
+    const double t117 = t4 * t5;
+    const double t118 = t116 + t117;
+    const double t119 = t36 * t118;
+    const double t120 = 0.5 * t119;
+    const double t121 = t115 - t120;
+    const double t122 = t30 != 0.0 ? t121 : t42;
+    const double t123 = t111 * t118;
+    const double t124 = t36 * t114;
+    const double t125 = 0.5 * t124;
+    const double t126 = t123 + t125;
+    const double t127 = t30 != 0.0 ? t126 : t43;
+    x[0] = t44;
+    x[1] = t122;
+    x[2] = t127;
 }
 
 void se2_compose(const double X[9], const double Y[9], double Z[9])
@@ -700,7 +1142,7 @@ void se2_defect(const double X[9], double defect[1])
     const double t23 = t21 + t22;
     const double t24 = fabs(t8);
     const double t25 = t23 + t24;
-    const double t27 = (double)(t25 < 1e+300);
+    const double t27 = (double)(t25 < HUGE_VAL);
     const double t28 = t1 + t3;
     const double t29 = fabs(t28);
     const double t31 = (double)(1.0 < t9);

@@ -4,6 +4,490 @@
 
 #include <math.h>
 
+static void so3_log_candidate(const double X[9], double x[3])
+{
+    const double t0 = X[0];
+    const double t1 = X[1];
+    const double t2 = X[2];
+    const double t3 = X[3];
+    const double t4 = X[4];
+    const double t5 = X[5];
+    const double t6 = X[6];
+    const double t7 = X[7];
+    const double t8 = X[8];
+    const double t12 = 1.0 + t0;
+    const double t13 = t12 + t4;
+    const double t14 = t13 + t8;
+    const double t15 = t12 - t4;
+    const double t16 = t15 - t8;
+    const double t17 = (double)(t14 < t16);
+    const double t18 = t17 != 0.0 ? t16 : t14;
+    const double t19 = 1.0 - t0;
+    const double t20 = t19 + t4;
+    const double t21 = t20 - t8;
+    const double t22 = (double)(t18 < t21);
+    const double t23 = t22 != 0.0 ? t21 : t18;
+    const double t24 = t19 - t4;
+    const double t25 = t24 + t8;
+    const double t26 = (double)(t23 < t25);
+    const double t27 = t3 - t1;
+    const double t28 = t2 - t6;
+    const double t29 = t7 - t5;
+    const double t30 = t17 != 0.0 ? t29 : t14;
+    const double t31 = t22 != 0.0 ? t28 : t30;
+    const double t32 = t26 != 0.0 ? t27 : t31;
+    const double t34 = (double)(t32 < 0.0);
+    const double t36 = t34 != 0.0 ? (-1.0) : 1.0;
+    const double t37 = t2 + t6;
+    const double t38 = t1 + t3;
+    const double t39 = t17 != 0.0 ? t16 : t29;
+    const double t40 = t22 != 0.0 ? t38 : t39;
+    const double t41 = t26 != 0.0 ? t37 : t40;
+    const double t42 = t36 * t41;
+    const double t43 = t42 * t42;
+    const double t44 = t5 + t7;
+    const double t45 = t17 != 0.0 ? t38 : t28;
+    const double t46 = t22 != 0.0 ? t21 : t45;
+    const double t47 = t26 != 0.0 ? t44 : t46;
+    const double t48 = t36 * t47;
+    const double t49 = t48 * t48;
+    const double t50 = t43 + t49;
+    const double t51 = t17 != 0.0 ? t37 : t27;
+    const double t52 = t22 != 0.0 ? t44 : t51;
+    const double t53 = t26 != 0.0 ? t25 : t52;
+    const double t54 = t36 * t53;
+    const double t55 = t54 * t54;
+    const double t56 = t50 + t55;
+    const double t57 = t36 * t32;
+    const double t58 = t57 * t57;
+    const double t59 = t58 + t56;
+    const double t60 = sqrt(t59);
+    const double t61 = t57 + t60;
+    const double t62 = t60 * t61;
+    const double t63 = 2.0 * t62;
+    const double t64 = sqrt(t63);
+    const double t65 = t61 + t64;
+    const double t66 = t64 * t65;
+    const double t67 = 2.0 * t66;
+    const double t68 = sqrt(t67);
+    const double t69 = t65 + t68;
+    const double t70 = 1.0 / t69;
+    const double t71 = t70 * t70;
+    const double t72 = t56 * t71;
+    const double t73 = t72 * t72;
+    const double t74 = 0.047619047619047616 * t73;
+    const double t76 = t74 + 0.058823529411764705;
+    const double t77 = t76 * t73;
+    const double t79 = t77 + 0.07692307692307693;
+    const double t80 = t79 * t73;
+    const double t82 = t80 + 0.1111111111111111;
+    const double t83 = t82 * t73;
+    const double t85 = t83 + 0.2;
+    const double t86 = t85 * t73;
+    const double t87 = t86 + 1.0;
+    const double t89 = (-0.043478260869565216) * t73;
+    const double t91 = t89 + (-0.05263157894736842);
+    const double t92 = t91 * t73;
+    const double t94 = t92 + (-0.06666666666666667);
+    const double t95 = t94 * t73;
+    const double t97 = t95 + (-0.09090909090909091);
+    const double t98 = t97 * t73;
+    const double t100 = t98 + (-0.14285714285714285);
+    const double t101 = t100 * t73;
+    const double t103 = t101 + (-0.3333333333333333);
+    const double t104 = t72 * t103;
+    const double t105 = t87 + t104;
+    const double t106 = t105 / t69;
+    const double t107 = 16.0 * t106;
+    const double t108 = t107 * t42;
+    const double t109 = t107 * t48;
+    const double t110 = t107 * t54;
+    x[0] = t108;
+    x[1] = t109;
+    x[2] = t110;
+}
+
+static void so3_log_error(const double x[3], const double X[9], double u[3], double error[2])
+{
+    const double t0 = x[0];
+    const double t1 = x[1];
+    const double t2 = x[2];
+    const double t3 = X[0];
+    const double t4 = X[1];
+    const double t5 = X[2];
+    const double t6 = X[3];
+    const double t7 = X[4];
+    const double t8 = X[5];
+    const double t9 = X[6];
+    const double t10 = X[7];
+    const double t11 = X[8];
+    const double t13 = t0 * t0;
+    const double t14 = t1 * t1;
+    const double t15 = t13 + t14;
+    const double t16 = t2 * t2;
+    const double t17 = t15 + t16;
+    const double t19 = (double)(t17 < 1.0);
+    const double t21 = (-4.110317623312165e-19) * t17;
+    const double t23 = t21 + 1.5619206968586225e-16;
+    const double t24 = t23 * t17;
+    const double t26 = t24 + (-4.779477332387385e-14);
+    const double t27 = t26 * t17;
+    const double t29 = t27 + 1.1470745597729725e-11;
+    const double t30 = t29 * t17;
+    const double t32 = t30 + (-2.08767569878681e-09);
+    const double t33 = t32 * t17;
+    const double t35 = t33 + 2.755731922398589e-07;
+    const double t36 = t35 * t17;
+    const double t38 = t36 + (-2.48015873015873e-05);
+    const double t39 = t38 * t17;
+    const double t41 = t39 + 0.001388888888888889;
+    const double t42 = t41 * t17;
+    const double t44 = t42 + (-0.041666666666666664);
+    const double t45 = t44 * t17;
+    const double t47 = t45 + 0.5;
+    const double t48 = t19 != 0.0 ? 1.0 : t17;
+    const double t49 = sqrt(t48);
+    const double t50 = cos(t49);
+    const double t51 = sin(t49);
+    const double t52 = 1.0 - t50;
+    const double t53 = t52 / t48;
+    const double t54 = t19 != 0.0 ? t47 : t53;
+    const double t55 = t0 * t1;
+    const double t56 = t54 * t55;
+    const double t58 = (-8.22063524662433e-18) * t17;
+    const double t60 = t58 + 2.8114572543455206e-15;
+    const double t61 = t60 * t17;
+    const double t63 = t61 + (-7.647163731819816e-13);
+    const double t64 = t63 * t17;
+    const double t66 = t64 + 1.6059043836821613e-10;
+    const double t67 = t66 * t17;
+    const double t69 = t67 + (-2.505210838544172e-08);
+    const double t70 = t69 * t17;
+    const double t72 = t70 + 2.7557319223985893e-06;
+    const double t73 = t72 * t17;
+    const double t75 = t73 + (-0.0001984126984126984);
+    const double t76 = t75 * t17;
+    const double t78 = t76 + 0.008333333333333333;
+    const double t79 = t78 * t17;
+    const double t81 = t79 + (-0.16666666666666666);
+    const double t82 = t81 * t17;
+    const double t83 = t82 + 1.0;
+    const double t84 = t51 / t49;
+    const double t85 = t19 != 0.0 ? t83 : t84;
+    const double t86 = t85 * t2;
+    const double t87 = t56 - t86;
+    const double t88 = t87 * t5;
+    const double t89 = t13 + t16;
+    const double t90 = t54 * t89;
+    const double t91 = 1.0 - t90;
+    const double t92 = t91 * t8;
+    const double t93 = t88 + t92;
+    const double t94 = t1 * t2;
+    const double t95 = t54 * t94;
+    const double t96 = t85 * t0;
+    const double t97 = t95 + t96;
+    const double t98 = t97 * t11;
+    const double t99 = t93 + t98;
+    const double t100 = (-0.5) * t99;
+    const double t101 = t0 * t2;
+    const double t102 = t54 * t101;
+    const double t103 = t85 * t1;
+    const double t104 = t102 + t103;
+    const double t105 = t104 * t4;
+    const double t106 = t95 - t96;
+    const double t107 = t106 * t7;
+    const double t108 = t105 + t107;
+    const double t109 = t54 * t15;
+    const double t110 = 1.0 - t109;
+    const double t111 = t110 * t10;
+    const double t112 = t108 + t111;
+    const double t113 = 0.5 * t112;
+    const double t114 = t100 + t113;
+    const double t115 = t14 + t16;
+    const double t116 = t54 * t115;
+    const double t117 = 1.0 - t116;
+    const double t118 = t117 * t5;
+    const double t119 = t56 + t86;
+    const double t120 = t119 * t8;
+    const double t121 = t118 + t120;
+    const double t122 = t102 - t103;
+    const double t123 = t122 * t11;
+    const double t124 = t121 + t123;
+    const double t125 = 0.5 * t124;
+    const double t126 = t104 * t3;
+    const double t127 = t106 * t6;
+    const double t128 = t126 + t127;
+    const double t129 = t110 * t9;
+    const double t130 = t128 + t129;
+    const double t131 = (-0.5) * t130;
+    const double t132 = t125 + t131;
+    const double t133 = t117 * t4;
+    const double t134 = t119 * t7;
+    const double t135 = t133 + t134;
+    const double t136 = t122 * t10;
+    const double t137 = t135 + t136;
+    const double t138 = (-0.5) * t137;
+    const double t139 = t87 * t3;
+    const double t140 = t91 * t6;
+    const double t141 = t139 + t140;
+    const double t142 = t97 * t9;
+    const double t143 = t141 + t142;
+    const double t144 = 0.5 * t143;
+    const double t145 = t138 + t144;
+    const double t146 = t117 * t3;
+    const double t147 = t119 * t6;
+    const double t148 = t146 + t147;
+    const double t149 = t122 * t9;
+    const double t150 = t148 + t149;
+    const double t152 = t150 + (-1.0);
+    const double t153 = t152 * t152;
+    const double t154 = t137 + t145;
+    const double t155 = t154 * t154;
+    const double t156 = t153 + t155;
+    const double t157 = t124 - t132;
+    const double t158 = t157 * t157;
+    const double t159 = t156 + t158;
+    const double t160 = t143 - t145;
+    const double t161 = t160 * t160;
+    const double t162 = t159 + t161;
+    const double t163 = t87 * t4;
+    const double t164 = t91 * t7;
+    const double t165 = t163 + t164;
+    const double t166 = t97 * t10;
+    const double t167 = t165 + t166;
+    const double t168 = t167 + (-1.0);
+    const double t169 = t168 * t168;
+    const double t170 = t162 + t169;
+    const double t171 = t99 + t114;
+    const double t172 = t171 * t171;
+    const double t173 = t170 + t172;
+    const double t174 = t130 + t132;
+    const double t175 = t174 * t174;
+    const double t176 = t173 + t175;
+    const double t177 = t112 - t114;
+    const double t178 = t177 * t177;
+    const double t179 = t176 + t178;
+    const double t180 = t104 * t5;
+    const double t181 = t106 * t8;
+    const double t182 = t180 + t181;
+    const double t183 = t110 * t11;
+    const double t184 = t182 + t183;
+    const double t185 = t184 + (-1.0);
+    const double t186 = t185 * t185;
+    const double t187 = t179 + t186;
+    const double t188 = sqrt(t187);
+    const double t189 = fabs(t3);
+    const double t190 = fabs(t4);
+    const double t191 = (double)(t189 < t190);
+    const double t192 = t191 != 0.0 ? t190 : t189;
+    const double t193 = fabs(t5);
+    const double t194 = (double)(t192 < t193);
+    const double t195 = t194 != 0.0 ? t193 : t192;
+    const double t196 = fabs(t6);
+    const double t197 = (double)(t195 < t196);
+    const double t198 = t197 != 0.0 ? t196 : t195;
+    const double t199 = fabs(t7);
+    const double t200 = (double)(t198 < t199);
+    const double t201 = t200 != 0.0 ? t199 : t198;
+    const double t202 = fabs(t8);
+    const double t203 = (double)(t201 < t202);
+    const double t204 = t203 != 0.0 ? t202 : t201;
+    const double t205 = fabs(t9);
+    const double t206 = (double)(t204 < t205);
+    const double t207 = t206 != 0.0 ? t205 : t204;
+    const double t208 = fabs(t10);
+    const double t209 = (double)(t207 < t208);
+    const double t210 = t209 != 0.0 ? t208 : t207;
+    const double t211 = fabs(t11);
+    const double t212 = (double)(t210 < t211);
+    const double t213 = t212 != 0.0 ? t211 : t210;
+    const double t214 = fabs(t117);
+    const double t215 = fabs(t119);
+    const double t216 = (double)(t214 < t215);
+    const double t217 = t216 != 0.0 ? t215 : t214;
+    const double t218 = fabs(t122);
+    const double t219 = (double)(t217 < t218);
+    const double t220 = t219 != 0.0 ? t218 : t217;
+    const double t221 = fabs(t87);
+    const double t222 = (double)(t220 < t221);
+    const double t223 = t222 != 0.0 ? t221 : t220;
+    const double t224 = fabs(t91);
+    const double t225 = (double)(t223 < t224);
+    const double t226 = t225 != 0.0 ? t224 : t223;
+    const double t227 = fabs(t97);
+    const double t228 = (double)(t226 < t227);
+    const double t229 = t228 != 0.0 ? t227 : t226;
+    const double t230 = fabs(t104);
+    const double t231 = (double)(t229 < t230);
+    const double t232 = t231 != 0.0 ? t230 : t229;
+    const double t233 = fabs(t106);
+    const double t234 = (double)(t232 < t233);
+    const double t235 = t234 != 0.0 ? t233 : t232;
+    const double t236 = fabs(t110);
+    const double t237 = (double)(t235 < t236);
+    const double t238 = t237 != 0.0 ? t236 : t235;
+    const double t239 = t213 * t238;
+    const double t240 = (double)(1.0 < t239);
+    const double t241 = t240 != 0.0 ? t239 : 1.0;
+    u[0] = t114;
+    u[1] = t132;
+    u[2] = t145;
+    error[0] = t188;
+    error[1] = t241;
+}
+
+
+
+/* y = x + rjac_inv(x) u, rjac = (1 - e^{-ad x})/ad x: its series after scaling, doubled, then elimination. 0 where it is singular. */
+static int so3_log_checked_newton(const double *x, const double *u, double *y)
+{
+    static const int place[6][3] = {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 0, 1}, {1, 2, 0}, {2, 1, 0} };
+    static const double value[6] = {1.0, -1.0, -1.0, 1.0, 1.0, -1.0 };
+    double B[3][3], E[3][3], F[3][4], P[3][3], R[3][3];
+    double size = 0.0;
+    int i, j, k, step, doublings = 0;
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j) {
+            B[i][j] = 0.0;
+        }
+    }
+    for (k = 0; k < 6; ++k) {
+        B[place[k][2]][place[k][1]] -= value[k] * x[place[k][0]];
+    }
+    for (i = 0; i < 3; ++i) {
+        double sum = 0.0;
+        for (j = 0; j < 3; ++j) {
+            sum += fabs(B[i][j]);
+        }
+        size = fmax(size, sum);
+    }
+    if (!(size < 1e6)) {
+        return 0;
+    }
+    for (; size > 0.5; size /= 2.0) {
+        ++doublings;
+    }
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j) {
+            B[i][j] = ldexp(B[i][j], -doublings);
+            P[i][j] = i == j ? 1.0 : 0.0;
+            E[i][j] = P[i][j];
+            F[i][j] = P[i][j];
+        }
+    }
+    for (step = 1; step <= 14; ++step) {
+        /* P = B^k / k!; E = sum of P, F = sum of P / (k + 1). */
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                R[i][j] = 0.0;
+                for (k = 0; k < 3; ++k) {
+                    R[i][j] += P[i][k] * B[k][j];
+                }
+            }
+        }
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                P[i][j] = R[i][j] / step;
+                E[i][j] += P[i][j];
+                F[i][j] += P[i][j] / (step + 1);
+            }
+        }
+    }
+    for (step = 0; step < doublings; ++step) {
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                R[i][j] = F[i][j] / 2.0;
+                P[i][j] = 0.0;
+                for (k = 0; k < 3; ++k) {
+                    R[i][j] += F[i][k] * E[k][j] / 2.0;
+                    P[i][j] += E[i][k] * E[k][j];
+                }
+            }
+        }
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) {
+                F[i][j] = R[i][j];
+                E[i][j] = P[i][j];
+            }
+        }
+    }
+    for (i = 0; i < 3; ++i) {
+        F[i][3] = u[i];
+    }
+    for (k = 0; k < 3; ++k) {
+        int best = k;
+        for (i = k + 1; i < 3; ++i) {
+            best = fabs(F[i][k]) > fabs(F[best][k]) ? i : best;
+        }
+        if (!(fabs(F[best][k]) > 1e-13)) {
+            return 0;
+        }
+        for (j = 0; j <= 3; ++j) {
+            const double t = F[k][j];
+            F[k][j] = F[best][j];
+            F[best][j] = t;
+        }
+        for (i = 0; i < 3; ++i) {
+            const double factor = i == k ? 0.0 : F[i][k] / F[k][k];
+            for (j = k; i != k && j <= 3; ++j) {
+                F[i][j] -= factor * F[k][j];
+            }
+        }
+    }
+    for (i = 0; i < 3; ++i) {
+        y[i] = x[i] + F[i][3] / F[i][i];
+    }
+    return 1;
+}
+
+/* x is taken if exp(hat x) = X (1 + hat u) with u of the size of rounding, after Newton steps as long as u falls: the fixed point is the logarithm
+   of the nearest element. error = (distance from the group, |X| |X^-1|). */
+static int so3_log_checked_certified(const double *X, double *x)
+{
+    double u[3], error[2], size = 0.0, next;
+    int k, step;
+    so3_log_error(x, X, u, error);
+    for (k = 0; k < 3; ++k) {
+        size = fabs(u[k]) <= size ? size : fabs(u[k]);
+    }
+    for (step = 0; step < 3 && !(size <= 4e-15 * error[1]); ++step) {
+        double y[3], v[3], fresh[2];
+        if (!so3_log_checked_newton(x, u, y)) {
+            break;
+        }
+        so3_log_error(y, X, v, fresh);
+        next = 0.0;
+        for (k = 0; k < 3; ++k) {
+            next = fabs(v[k]) <= next ? next : fabs(v[k]);
+        }
+        if (!(next < size)) {
+            break;
+        }
+        for (k = 0; k < 3; ++k) {
+            x[k] = y[k];
+            u[k] = v[k];
+        }
+        error[0] = fresh[0];
+        error[1] = fresh[1];
+        size = next;
+    }
+    return size <= 1e-12 * error[1] && error[0] <= 1e-05 * error[1];
+}
+
+static void so3_log_checked(const double *X, double *x)
+{
+    int k;
+    do {
+        so3_log_candidate(X, x);
+        if (so3_log_checked_certified(X, x)) {
+            return;
+        }
+    } while (0);
+    for (k = 0; k < 3; ++k) {
+        x[k] = NAN;
+    }
+}
+
 void so3_product_exp(const double g[3], double X[9])
 {
     const double t0 = g[0];
@@ -197,105 +681,149 @@ void so3_log(const double X[9], double x[3])
     const double t6 = X[6];
     const double t7 = X[7];
     const double t8 = X[8];
-    const double t12 = 1.0 + t0;
-    const double t13 = t12 + t4;
-    const double t14 = t13 + t8;
-    const double t15 = t12 - t4;
-    const double t16 = t15 - t8;
-    const double t17 = (double)(t14 < t16);
-    const double t18 = t17 != 0.0 ? t16 : t14;
-    const double t19 = 1.0 - t0;
-    const double t20 = t19 + t4;
-    const double t21 = t20 - t8;
-    const double t22 = (double)(t18 < t21);
-    const double t23 = t22 != 0.0 ? t21 : t18;
-    const double t24 = t19 - t4;
-    const double t25 = t24 + t8;
-    const double t26 = (double)(t23 < t25);
-    const double t27 = t3 - t1;
-    const double t28 = t2 - t6;
-    const double t29 = t7 - t5;
-    const double t30 = t17 != 0.0 ? t29 : t14;
-    const double t31 = t22 != 0.0 ? t28 : t30;
-    const double t32 = t26 != 0.0 ? t27 : t31;
-    const double t34 = (double)(t32 < 0.0);
-    const double t36 = t34 != 0.0 ? (-1.0) : 1.0;
-    const double t37 = t2 + t6;
-    const double t38 = t1 + t3;
-    const double t39 = t17 != 0.0 ? t16 : t29;
-    const double t40 = t22 != 0.0 ? t38 : t39;
-    const double t41 = t26 != 0.0 ? t37 : t40;
-    const double t42 = t36 * t41;
-    const double t43 = t42 * t42;
-    const double t44 = t5 + t7;
-    const double t45 = t17 != 0.0 ? t38 : t28;
-    const double t46 = t22 != 0.0 ? t21 : t45;
-    const double t47 = t26 != 0.0 ? t44 : t46;
-    const double t48 = t36 * t47;
-    const double t49 = t48 * t48;
-    const double t50 = t43 + t49;
-    const double t51 = t17 != 0.0 ? t37 : t27;
-    const double t52 = t22 != 0.0 ? t44 : t51;
-    const double t53 = t26 != 0.0 ? t25 : t52;
-    const double t54 = t36 * t53;
-    const double t55 = t54 * t54;
-    const double t56 = t50 + t55;
-    const double t57 = t36 * t32;
-    const double t58 = t57 * t57;
-    const double t59 = t58 + t56;
-    const double t60 = sqrt(t59);
-    const double t61 = t57 + t60;
-    const double t62 = t61 * t61;
-    const double t63 = t56 / t62;
-    const double t64 = 1.0 + t63;
-    const double t65 = sqrt(t64);
-    const double t66 = 1.0 + t65;
-    const double t67 = t66 * t66;
-    const double t68 = t63 / t67;
-    const double t69 = 1.0 + t68;
-    const double t70 = sqrt(t69);
-    const double t71 = 1.0 + t70;
-    const double t72 = t71 * t71;
-    const double t73 = t68 / t72;
-    const double t74 = 0.034482758620689655 * t73;
-    const double t76 = t74 + (-0.037037037037037035);
-    const double t77 = t76 * t73;
-    const double t79 = t77 + 0.04;
-    const double t80 = t79 * t73;
-    const double t82 = t80 + (-0.043478260869565216);
-    const double t83 = t82 * t73;
-    const double t85 = t83 + 0.047619047619047616;
-    const double t86 = t85 * t73;
-    const double t88 = t86 + (-0.05263157894736842);
-    const double t89 = t88 * t73;
-    const double t91 = t89 + 0.058823529411764705;
-    const double t92 = t91 * t73;
-    const double t94 = t92 + (-0.06666666666666667);
-    const double t95 = t94 * t73;
-    const double t97 = t95 + 0.07692307692307693;
-    const double t98 = t97 * t73;
-    const double t100 = t98 + (-0.09090909090909091);
-    const double t101 = t100 * t73;
-    const double t103 = t101 + 0.1111111111111111;
-    const double t104 = t103 * t73;
-    const double t106 = t104 + (-0.14285714285714285);
-    const double t107 = t106 * t73;
-    const double t109 = t107 + 0.2;
-    const double t110 = t109 * t73;
-    const double t112 = t110 + (-0.3333333333333333);
-    const double t113 = t112 * t73;
-    const double t114 = t113 + 1.0;
-    const double t115 = 4.0 * t114;
-    const double t116 = t66 * t71;
-    const double t117 = t115 / t116;
-    const double t118 = 4.0 * t117;
-    const double t119 = t118 / t61;
-    const double t120 = t119 * t42;
-    const double t121 = t119 * t48;
-    const double t122 = t119 * t54;
-    x[0] = t120;
-    x[1] = t121;
-    x[2] = t122;
+    const double t9 = t3 * t7;
+    const double t10 = t6 * t4;
+    const double t11 = t9 - t10;
+    const double t12 = t11 - t2;
+    const double t13 = t12 * t12;
+    const double t14 = t6 * t1;
+    const double t15 = t0 * t7;
+    const double t16 = t14 - t15;
+    const double t17 = t16 - t5;
+    const double t18 = t17 * t17;
+    const double t19 = t13 + t18;
+    const double t20 = t0 * t4;
+    const double t21 = t3 * t1;
+    const double t22 = t20 - t21;
+    const double t23 = t22 - t8;
+    const double t24 = t23 * t23;
+    const double t25 = t19 + t24;
+    const double t26 = t0 * t0;
+    const double t27 = t3 * t3;
+    const double t28 = t26 + t27;
+    const double t29 = t6 * t6;
+    const double t30 = t28 + t29;
+    const double t32 = t30 - 1.0;
+    const double t33 = t32 * t32;
+    const double t34 = t25 + t33;
+    const double t35 = t1 * t1;
+    const double t36 = t4 * t4;
+    const double t37 = t35 + t36;
+    const double t38 = t7 * t7;
+    const double t39 = t37 + t38;
+    const double t40 = t39 - 1.0;
+    const double t41 = t40 * t40;
+    const double t42 = t34 + t41;
+    const double t43 = t0 * t1;
+    const double t44 = t3 * t4;
+    const double t45 = t43 + t44;
+    const double t46 = t6 * t7;
+    const double t47 = t45 + t46;
+    const double t48 = t47 * t47;
+    const double t49 = t42 + t48;
+    const double t51 = (double)(t49 < 1e-26);
+    const double t54 = 1.0 + t0;
+    const double t55 = t54 + t4;
+    const double t56 = t55 + t8;
+    const double t57 = t54 - t4;
+    const double t58 = t57 - t8;
+    const double t59 = (double)(t56 < t58);
+    const double t60 = t59 != 0.0 ? t58 : t56;
+    const double t61 = 1.0 - t0;
+    const double t62 = t61 + t4;
+    const double t63 = t62 - t8;
+    const double t64 = (double)(t60 < t63);
+    const double t65 = t64 != 0.0 ? t63 : t60;
+    const double t66 = t61 - t4;
+    const double t67 = t66 + t8;
+    const double t68 = (double)(t65 < t67);
+    const double t69 = t3 - t1;
+    const double t70 = t2 - t6;
+    const double t71 = t7 - t5;
+    const double t72 = t59 != 0.0 ? t71 : t56;
+    const double t73 = t64 != 0.0 ? t70 : t72;
+    const double t74 = t68 != 0.0 ? t69 : t73;
+    const double t76 = (double)(t74 < 0.0);
+    const double t78 = t76 != 0.0 ? (-1.0) : 1.0;
+    const double t79 = t2 + t6;
+    const double t80 = t1 + t3;
+    const double t81 = t59 != 0.0 ? t58 : t71;
+    const double t82 = t64 != 0.0 ? t80 : t81;
+    const double t83 = t68 != 0.0 ? t79 : t82;
+    const double t84 = t78 * t83;
+    const double t85 = t84 * t84;
+    const double t86 = t5 + t7;
+    const double t87 = t59 != 0.0 ? t80 : t70;
+    const double t88 = t64 != 0.0 ? t63 : t87;
+    const double t89 = t68 != 0.0 ? t86 : t88;
+    const double t90 = t78 * t89;
+    const double t91 = t90 * t90;
+    const double t92 = t85 + t91;
+    const double t93 = t59 != 0.0 ? t79 : t69;
+    const double t94 = t64 != 0.0 ? t86 : t93;
+    const double t95 = t68 != 0.0 ? t67 : t94;
+    const double t96 = t78 * t95;
+    const double t97 = t96 * t96;
+    const double t98 = t92 + t97;
+    const double t99 = t78 * t74;
+    const double t100 = t99 * t99;
+    const double t101 = t100 + t98;
+    const double t102 = sqrt(t101);
+    const double t103 = t99 + t102;
+    const double t104 = t102 * t103;
+    const double t105 = 2.0 * t104;
+    const double t106 = sqrt(t105);
+    const double t107 = t103 + t106;
+    const double t108 = t106 * t107;
+    const double t109 = 2.0 * t108;
+    const double t110 = sqrt(t109);
+    const double t111 = t107 + t110;
+    const double t112 = 1.0 / t111;
+    const double t113 = t112 * t112;
+    const double t114 = t98 * t113;
+    const double t115 = t114 * t114;
+    const double t116 = 0.047619047619047616 * t115;
+    const double t118 = t116 + 0.058823529411764705;
+    const double t119 = t118 * t115;
+    const double t121 = t119 + 0.07692307692307693;
+    const double t122 = t121 * t115;
+    const double t124 = t122 + 0.1111111111111111;
+    const double t125 = t124 * t115;
+    const double t127 = t125 + 0.2;
+    const double t128 = t127 * t115;
+    const double t129 = t128 + 1.0;
+    const double t131 = (-0.043478260869565216) * t115;
+    const double t133 = t131 + (-0.05263157894736842);
+    const double t134 = t133 * t115;
+    const double t136 = t134 + (-0.06666666666666667);
+    const double t137 = t136 * t115;
+    const double t139 = t137 + (-0.09090909090909091);
+    const double t140 = t139 * t115;
+    const double t142 = t140 + (-0.14285714285714285);
+    const double t143 = t142 * t115;
+    const double t145 = t143 + (-0.3333333333333333);
+    const double t146 = t114 * t145;
+    const double t147 = t129 + t146;
+    const double t148 = t147 / t111;
+    const double t149 = 16.0 * t148;
+    const double t150 = t149 * t84;
+    const double t151 = t51 != 0.0 ? 1.0 : 0.0;
+    const double t153 = (double)(t151 < 0.5);
+    double t154[3] = {0.0};
+    if (t153 != 0) {
+        so3_log_checked((const double[9]){t0, t1, t2, t3, t4, t5, t6, t7, t8}, t154);
+    }
+    const double t155 = t154[0];
+    const double t156 = t154[1];
+    const double t157 = t154[2];
+    const double t158 = t51 != 0.0 ? t150 : t155;
+    const double t159 = t149 * t90;
+    const double t160 = t51 != 0.0 ? t159 : t156;
+    const double t161 = t149 * t96;
+    const double t162 = t51 != 0.0 ? t161 : t157;
+    x[0] = t158;
+    x[1] = t160;
+    x[2] = t162;
 }
 
 void so3_compose(const double X[9], const double Y[9], double Z[9])
@@ -854,7 +1382,7 @@ void so3_defect(const double X[9], double defect[1])
     const double t23 = t21 + t22;
     const double t24 = fabs(t8);
     const double t25 = t23 + t24;
-    const double t27 = (double)(t25 < 1e+300);
+    const double t27 = (double)(t25 < HUGE_VAL);
     const double t28 = t0 * t0;
     const double t29 = t3 * t3;
     const double t30 = t28 + t29;
