@@ -8,9 +8,9 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.control.reference import Reference
 from lie_codegen.control.reference_check import check_reference
 from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_motion import Reference
 from lie_codegen.control.second_order_step import ForceBody, check_loop, law_states, second_order_step
 from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.groups.maps.element_pattern import packed_size

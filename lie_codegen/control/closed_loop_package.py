@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.control.reference import Reference
 from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_motion import Reference
 from lie_codegen.control.second_order_step import check_loop, held_force_step, law_states
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_number

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lie_codegen.control.reference import Reference
 from lie_codegen.control.reference_kernels import ReferenceBody
+from lie_codegen.control.reference_motion import Reference
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.control.reference import TIME, FormulaReference, Reference, WaypointReference, formula_reference
+from lie_codegen.control.reference_motion import TIME, FormulaReference, Reference, WaypointReference, formula_reference
 from lie_codegen.control.waypoints import waypoint_reference
 from lie_codegen.errors import InputError
 from lie_codegen.groups.derivation import GroupDerivation

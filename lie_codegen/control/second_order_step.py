@@ -13,7 +13,7 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.control.reference import Reference
+from lie_codegen.control.reference_motion import Reference
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.derivation import GroupDerivation

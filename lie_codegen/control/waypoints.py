@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.control.reference import WaypointReference
+from lie_codegen.control.reference_motion import WaypointReference
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.admission import admitted

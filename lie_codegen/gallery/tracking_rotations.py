@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.control.closed_loop import ClosedLoop, closed_loop
-from lie_codegen.control.reference import formula_reference
+from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.gallery.attitude_style import BLUE, GREEN, GREY, RED, brick, quiet
 from lie_codegen.groups.catalogue_load import group

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.control.closed_loop import ClosedLoop, closed_loop
-from lie_codegen.control.reference import FormulaReference, formula_reference
 from lie_codegen.control.reference_kernels import ReferenceBody
+from lie_codegen.control.reference_motion import FormulaReference, formula_reference
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.control.tracking_region import TrackingRegion, tracking_region
 from lie_codegen.gallery.attitude_style import COLOURS, quiet, tidy

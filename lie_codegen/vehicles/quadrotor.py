@@ -21,7 +21,7 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.control.reference import TIME
+from lie_codegen.control.reference_motion import TIME
 from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression

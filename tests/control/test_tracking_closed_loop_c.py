@@ -12,8 +12,8 @@ from scipy.linalg import expm
 
 from lie_codegen.control.attitude_law import attitude_law
 from lie_codegen.control.closed_loop_package import generate_closed_loop
-from lie_codegen.control.reference import formula_reference
 from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.second_order_step import held_force_step
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.groups.catalogue_load import group as load

@@ -38,6 +38,7 @@ ALLOWED = {
     "platformdirs": {"runtime"},
     "filelock": {"runtime"},
     "numpy": set(LAYERS),
+    "lazy_loader": set(LAYERS),
     "ziglang": {"runtime"},
 }  # fmt: skip
 

@@ -9,9 +9,9 @@ from scipy.linalg import expm, logm
 
 from lie_codegen.control.attitude_law import attitude_law
 from lie_codegen.control.closed_loop import closed_loop
-from lie_codegen.control.reference import formula_reference
 from lie_codegen.control.reference_check import check_reference
 from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.second_order_step import second_order_step
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.control.waypoints import waypoint_reference

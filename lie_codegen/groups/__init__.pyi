@@ -1,0 +1,30 @@
+"""Matrix Lie groups: definition, catalogue, structure, maps and Wei-Norman charts."""
+
+from .build import build as build
+from .build import generate as generate
+from .catalogue_load import group as group
+from .catalogue_names import group_names as group_names
+from .change_of_basis import change_of_basis as change_of_basis
+from .controllability import controllability as controllability
+from .conventions import quaternion_from_rotation as quaternion_from_rotation
+from .conventions import rotation_from_quaternion as rotation_from_quaternion
+from .conventions import tangent_from as tangent_from
+from .conventions import tangent_to as tangent_to
+from .definition import from_brackets as from_brackets
+from .definition import from_matrices as from_matrices
+from .kernels import group_kernels as group_kernels
+from .maps.barycentre import interpolate as interpolate
+from .maps.barycentre import mean as mean
+from .maps.covariance_kernels import covariance_kernels as covariance_kernels
+from .maps.nearest import nearest as nearest
+from .maps.uncertain import Uncertain as Uncertain
+from .maps.uncertain import fuse as fuse
+from .matrix_group import MatrixGroup as MatrixGroup
+from .pauli import pauli as pauli
+from .products import product as product
+from .products import semidirect as semidirect
+from .structure import structure as structure
+from .wei_norman.chart_domain import chart_domain as chart_domain
+from .wei_norman.matrix import wei_norman as wei_norman
+from .wei_norman.order import wei_norman_order as wei_norman_order
+from .cartan import cartan_involution as cartan_involution

@@ -1,0 +1,3 @@
+"""Pictures of plans, runs and averages."""
+
+from .plot_plan import plot_plan as plot_plan

@@ -1,0 +1,4 @@
+"""Inputs as functions of time: periodic, sampled, piecewise, from text."""
+
+from .periodic_input import PeriodicInput as PeriodicInput
+from .sampled_input import SampledInput as SampledInput

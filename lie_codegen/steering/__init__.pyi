@@ -1,0 +1,12 @@
+"""Steering: tasks, goals, constraints, plans and open optimal control."""
+
+from .constraints import Ball as Ball
+from .constraints import Cone as Cone
+from .front import steer as steer
+from .goals import Coset as Coset
+from .goals import Pointing as Pointing
+from .goals import Position as Position
+from .goals import UpToPhase as UpToPhase
+from .ocp.front import ocp as ocp
+from .ocp.mpc import mpc as mpc
+from .qutip_export import qutip_evolution as qutip_evolution

@@ -1,0 +1,1 @@
+"""Vehicles and bodies: quadrotor, underwater vehicle, sphere, manipulator, actuator allocation."""
