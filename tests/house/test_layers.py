@@ -38,7 +38,7 @@ ALLOWED = {
     "platformdirs": {"runtime"},
     "filelock": {"runtime"},
     "numpy": set(LAYERS),
-    "lazy_loader": set(LAYERS),
+    "lazy_loader": {None, *LAYERS},
     "ziglang": {"runtime"},
 }  # fmt: skip
 
