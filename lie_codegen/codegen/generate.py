@@ -24,9 +24,9 @@ def generate(
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
     Args:
-        kernels: all of one namespace.
+        kernels: of one namespace or of several.
         folder: created if need be; an existing one must be empty or hold an unedited package of ours.
-        namespace: prefix of every symbol, and the name of the header and the CMake target.
+        namespace: the name of the header, the source and the CMake target.
         metadata: what the documentation says about the group: `PackageMetadata` or a mapping of its fields.
         extra: further files of the package, {path: text}.
         real: "double", or "float" for processors that have no double; the formulas are the same.

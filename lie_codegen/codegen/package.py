@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lie_codegen.codegen.lanes import lane_body, lanes_header
@@ -102,12 +102,21 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
         files=files,
         main=f"{namespace}_binding.c",
         statements=max(len(tape.statements) for tape in tapes),
-        signatures=tuple(Signature.of(kernel) for kernel in kernels),
+        signatures=library_signatures(kernels),
         notes=tuple(
             f"{kernel.name}: batches call libm lane by lane for {', '.join(body.slow)}"
             for kernel, body in zip(kernels, bodies, strict=True)
             if body.slow
         ),
+    )
+
+
+def library_signatures(kernels: Sequence[Kernel]) -> tuple[Signature, ...]:
+    """The signatures; a name that two namespaces share gives way to the symbol."""
+    names = [kernel.name for kernel in kernels]
+    return tuple(
+        replace(Signature.of(kernel), name=kernel.symbol) if names.count(kernel.name) > 1 else Signature.of(kernel)
+        for kernel in kernels
     )
 
 
@@ -123,13 +132,11 @@ def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata, 
 
 
 def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
-    """Every exported symbol bears the namespace, and no two are equal."""
+    """No two exported symbols are equal."""
     if not kernels:
         raise CodegenError(f"{namespace}: no kernel given")
     owner: dict[str, str] = {}
     for kernel in kernels:
-        if kernel.namespace != namespace:
-            raise CodegenError(f"kernel {kernel.symbol} is not of the namespace {namespace}: rename one of them")
         suffixes = ("", "_call", "_batch", "_lanes") + (
             ("_scan", "_scan_batch") if is_step(kernel.inputs, kernel.outputs) else ()
         )

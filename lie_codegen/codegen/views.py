@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lie_codegen.codegen.opcodes import C99, RESERVED, Target
 from lie_codegen.codegen.signature import is_step
@@ -141,6 +141,7 @@ def package_view(
     target: Target = C99,
 ) -> PackageView:
     """The view of a package: texts made safe for a C comment, statements printed for the target."""
+    names = [kernel.name for kernel in kernels]
     units = metadata.units or ("",) * len(metadata.labels)
     basis = tuple(
         _safe(f"{index}: {label}" + (f" [{unit}]" if unit else ""))
@@ -155,7 +156,8 @@ def package_view(
         version=metadata.version,
         type_name=target.type_name,
         kernels=tuple(
-            kernel_view(kernel, tape, target, in_parts=True) for kernel, tape in zip(kernels, tapes, strict=True)
+            _told_apart(kernel_view(kernel, tape, target, in_parts=True), names)
+            for kernel, tape in zip(kernels, tapes, strict=True)
         ),
         routines=tuple(routine_view(routine) for routine in routines_of(tapes)),
     )
@@ -171,6 +173,11 @@ def routine_view(routine: Routine) -> RoutineView:
     """The C text of a routine and of the kernels it calls, all in double."""
     helpers = tuple(kernel_view(kernel, tape_of(kernel), in_parts=True) for kernel in routine.helpers)
     return RoutineView(helpers, render(routine.template, name=routine.name, **dict(routine.settings)))
+
+
+def _told_apart(view: KernelView, names: Sequence[str]) -> KernelView:
+    """A name that two namespaces share gives way to the symbol."""
+    return replace(view, name=view.symbol) if names.count(view.name) > 1 else view
 
 
 def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: bool = False) -> KernelView:

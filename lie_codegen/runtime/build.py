@@ -110,6 +110,14 @@ def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> L
     return Library(namespace, functions, None)
 
 
+def defined_together(kernels: Sequence[Kernel]) -> str | None:
+    """What determines these kernels, as one text; None if one of them has no definition."""
+    if any(kernel.definition is None for kernel in kernels):
+        return None
+    texts = [f"{kernel.symbol} {kernel.definition.text}" for kernel in kernels if kernel.definition is not None]
+    return "\n".join(["kernels", *texts])
+
+
 def _namespace(given: str | None, kernels: Sequence[Kernel]) -> str:
     if given is None and not kernels:
         raise CodegenError("no kernel given")
