@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def bench(
-    what: Annotated[str, typer.Argument(help='"" for everything that is timed, "steering" for bounded steering.')] = "",
+    what: Annotated[str, typer.Argument(help='"" for everything that is timed, "steering", "control".')] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
     only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
     json: Json = False,
@@ -25,8 +25,11 @@ def bench(
     if what == "steering":
         _steering(only, json)
         return
+    if what == "control":
+        _control(json)
+        return
     if what:
-        raise InputError(f'bench: nothing is called {what!r}; there is "steering", or nothing for everything else')
+        raise InputError(f'bench: nothing is called {what!r}; there are "steering", "control", or nothing for the rest')
     from lie_codegen.benchmarks.run import bench as measure
 
     with progress("bench") as report:
@@ -39,6 +42,14 @@ def _steering(only: str, json: bool) -> None:
 
     with progress("bench steering") as report:
         rows = bench_bounded(only=only, say=report)
+    emit(table(rows), {"rows": [asdict(row) for row in rows]}, json)
+
+
+def _control(json: bool) -> None:
+    from lie_codegen.benchmarks.open_control import bench_control, table
+
+    with progress("bench control") as report:
+        rows = bench_control(say=report)
     emit(table(rows), {"rows": [asdict(row) for row in rows]}, json)
 
 

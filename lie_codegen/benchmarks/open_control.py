@@ -1,0 +1,184 @@
+"""lie-codegen bench control: a quadrotor among cylinders, the same discretisation and cost, by lc.ocp and by CasADi's solvers.
+
+Everybody minimises sum_k h |r(x_k, u_k)|^2 / 2 + |r_N(x_N)|^2 / 2 over 30 intervals of RKMK4 on SE(3) from hovering controls; the peers'
+states are matrix entries, their functions scalar expressions (SX), interpreted, or written as C and compiled beforehand. Time of the
+solver alone, cold; a solution counts where its conditions hold to 1e-4 and its cost is not more than 1 % above the best of all.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.benchmarks.open_quadrotor import HOVER, INTERVALS, STEP, Tasks, program, quadrotor, tasks
+from lie_codegen.errors import CompileError
+from lie_codegen.runtime.compiler import compile_library, find_compilers
+from lie_codegen.steering.ocp.mpc import mpc
+from lie_codegen.steering.plan import Status
+
+Array = NDArray[Any]
+
+_NEAR = 1e-4
+_GOOD = 1.01
+#: A peer's solution: controls are not compared, cost and violation are.
+Outcome = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ControlRow:
+    """One solver.
+
+    Attributes:
+        solver: its name.
+        solved, good, tasks: tasks whose conditions are met; and as cheap as the best found to 1 %; of how many.
+        median_ms, p95_ms: of a solution.
+        over_ours: median of the ratio to ours, task by task.
+        iterations: median.
+        note: why there are no numbers.
+    """
+
+    solver: str
+    solved: int = 0
+    good: int = 0
+    tasks: int = 0
+    median_ms: float = float("nan")
+    p95_ms: float = float("nan")
+    over_ours: float = float("nan")
+    iterations: float = float("nan")
+    note: str = ""
+
+
+def bench_control(count: int = 20, seed: int = 0, say: Callable[[str], None] = lambda line: None) -> list[ControlRow]:
+    """A row for each solver, ours first, and ours in the loop last."""
+    given = tasks(count, seed)
+    outcomes: dict[str, list[Outcome]] = {}
+    notes: dict[str, str] = {}
+    iterations: dict[str, list[float]] = {}
+    solvers: dict[str, Callable[[], Callable[[Array], tuple[Outcome, float]]]] = {
+        "lie_codegen, one start": _ours,
+        "fatrop, interpreted": lambda: _peer("fatrop", compiled=False),
+        "fatrop, compiled": lambda: _peer("fatrop", compiled=True),
+        "ipopt, interpreted": lambda: _peer("ipopt", compiled=False),
+    }
+    for name, make in solvers.items():
+        say(name)
+        try:
+            solve = make()
+        except (RuntimeError, CompileError) as error:
+            notes[name] = str(error).splitlines()[0]
+            continue
+        solve(given[0])  # compiled, cached, warmed up
+        found = [solve(task) for task in given]
+        outcomes[name] = [outcome for outcome, _ in found]
+        iterations[name] = [steps for _, steps in found]
+    best = np.min([[cost if off <= _NEAR else np.inf for cost, off, _ in each] for each in outcomes.values()], axis=0)
+    ours = np.array([ms for _, _, ms in outcomes["lie_codegen, one start"]])
+    rows = [_row(name, outcomes[name], iterations[name], best, ours) for name in outcomes]
+    rows += [ControlRow(name, note=note) for name, note in notes.items()]
+    return [*rows, _loop_row(given)]
+
+
+def table(rows: Sequence[ControlRow]) -> str:
+    """The rows as a text."""
+    lines = [f"{'':30}{'solved':>9}{'good':>7}{'ms':>10}{'p95':>10}{'/ours':>9}{'its':>7}"]
+    for row in rows:
+        if row.note:
+            lines.append(f"{row.solver:30}  -  {row.note}")
+            continue
+        numbers = f"{row.median_ms:10.2f}{row.p95_ms:10.2f}{row.over_ours:9.1f}{row.iterations:7.0f}"
+        lines.append(f"{row.solver:30}{f'{row.solved}/{row.tasks}':>9}{row.good:>7}{numbers}")
+    return "\n".join(lines)
+
+
+def _row(name: str, found: list[Outcome], steps: list[float], best: Array, ours: Array) -> ControlRow:
+    times = np.array([ms for _, _, ms in found])
+    met = np.array([off <= _NEAR for _, off, _ in found])
+    cheap = met & (np.array([cost for cost, _, _ in found]) <= _GOOD * best)
+    return ControlRow(
+        name, int(np.sum(met)), int(np.sum(cheap)), len(found), float(np.median(times)), float(np.percentile(times, 95)),
+        float(np.median(times / ours)), float(np.median(steps)),
+    )  # fmt: skip
+
+
+def _ours() -> Callable[[Array], tuple[Outcome, float]]:
+    problem = quadrotor()
+
+    def solve(task: Array) -> tuple[Outcome, float]:
+        began = time.perf_counter()
+        plan = problem.solve(target=task[:3], cyl=task[3:], threads=1)
+        ms = 1e3 * (time.perf_counter() - began)
+        return (plan.cost, plan.violation, ms), float(plan.iterations)
+
+    return solve
+
+
+def _peer(solver: str, *, compiled: bool) -> Callable[[Array], tuple[Outcome, float]]:
+    """CasADi's solver of the same program.
+
+    Raises:
+        RuntimeError: CasADi was built without it.
+        CompileError: its C text does not compile.
+    """
+    nlp, lower, upper, limits, equalities = program()
+    options: dict[str, Any] = {"print_time": False, "expand": True}
+    if solver == "fatrop":
+        options |= {"structure_detection": "auto", "equality": equalities, "fatrop": {"print_level": 0, "tol": 1e-8}}
+    else:
+        options |= {"ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-8}}
+    made = ca.nlpsol("peer", solver, nlp, options)
+    if compiled:
+        folder = Path(tempfile.mkdtemp(prefix="lie_codegen-bench-"))
+        generator = ca.CodeGenerator("model.c")
+        generator.add(ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]], ["x", "p"], ["f", "g"]))
+        for name in made.get_function():
+            generator.add(made.get_function(name))
+        (folder / "model.c").write_text(generator.dump())
+        compilers = find_compilers()
+        if not compilers:
+            raise CompileError("no C compiler")
+        compile_library(compilers[0], folder, "model.c", "model.so", ("-O2", "-march=native", "-fPIC", "-shared"))
+        options.pop("expand")
+        made = ca.nlpsol("peer", solver, str(folder / "model.so"), options)
+    guess = first_guess()
+
+    def solve(task: Array) -> tuple[Outcome, float]:
+        began = time.perf_counter()
+        found = made(x0=guess, p=task, lbx=lower, ubx=upper, lbg=limits[0], ubg=limits[1])
+        ms = 1e3 * (time.perf_counter() - began)
+        g = np.array(found["g"]).ravel()
+        off = float(np.max(np.maximum(limits[0] - g, g - limits[1]), initial=0.0))
+        return (float(found["f"]), off, ms), float(made.stats().get("iter_count", -1))
+
+    return solve
+
+
+def first_guess() -> Array:
+    """Hovering where it is: states of rest, controls of hover, stage by stage."""
+    state = np.concatenate([np.eye(3).ravel(), np.zeros(6)])
+    return np.concatenate([np.tile(np.concatenate([state, HOVER]), INTERVALS), state])
+
+
+def _loop_row(given: Tasks) -> ControlRow:
+    """Warm samples: the loop around its own model, from Python."""
+    problem = quadrotor()
+    seconds: list[float] = []
+    for task in given[:5]:
+        plan = problem.solve(target=task[:3], cyl=task[3:], threads=1)
+        if plan.status is not Status.SOLVED:
+            continue
+        controller = mpc(problem)
+        controller.reset(plan)
+        seconds += list(controller.simulate(steps=60, noise=0.002).seconds)
+    ms = 1e3 * np.array(seconds)
+    return ControlRow(
+        f"lie_codegen, a sample of {STEP * 1e3:g} ms", len(ms), len(ms), len(ms), float(np.median(ms)),
+        float(np.percentile(ms, 95)), float("nan"), 1.0,
+    )  # fmt: skip
