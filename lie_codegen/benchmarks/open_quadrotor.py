@@ -28,7 +28,7 @@ _STAGE, _END = (2.0, 0.6, 0.3, 0.15, 0.3), (6.0, 2.0, 1.0)
 def tasks(count: int, seed: int) -> Tasks:
     """Random targets behind cylinders that touch neither each other, nor the start, nor the target."""
     rng = np.random.default_rng(seed)
-    rows = []
+    rows: list[Array] = []
     while len(rows) < count:
         target = np.array([rng.uniform(1.5, 2.5), rng.uniform(-1, 1), rng.uniform(0.5, 1.5)])
         discs: list[Array] = []
@@ -99,7 +99,7 @@ def _residual(axes: tuple[Any, Any, Any], v: Any, target: Any, weights: tuple[fl
 
 def _inside(place: Any, discs: Any) -> list[Any]:
     """How deep in each cylinder, in metres near its surface."""
-    rows = []
+    rows: list[Array] = []
     for i in range(CYLINDERS):
         dx, dy, r = place[0] - discs[3 * i], place[1] - discs[3 * i + 1], discs[3 * i + 2]
         rows.append((r * r - dx * dx - dy * dy) / (2 * r))

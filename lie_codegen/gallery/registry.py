@@ -47,6 +47,11 @@ TARGETS = (
         "steering_trailer",
         "a tractor with a trailer moved sideways: the Engel group and a figure of eight",
     ),
+    Target("open_quadrotor", "open_control", "a quadrotor around a cylinder: plan, and the loop in noise"),
+    Target("open_satellite", "open_control", "a satellite with three wheels and a star tracker that keeps off the sun"),
+    Target("open_parking", "open_control", "a car parked half a metre sideways"),
+    Target("open_underwater", "open_control", "an underwater vehicle in a current, which is a parameter"),
+    Target("open_qubit", "open_control", "a gate of a detuned qubit by a bounded drive"),
     Target(
         "hessian_errors",
         "hessian_errors",

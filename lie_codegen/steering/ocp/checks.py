@@ -27,8 +27,8 @@ def check_problem(data: ProblemData, where: str) -> None:
     n = data.group.dim
     if isinstance(data.velocity, tuple):
         _require(data, at, data.velocity, n, f"{where}: velocity")
-    if isinstance(data.velocity, SecondOrder) and data.velocity.force is not None:
-        _require(data, at, (data.velocity.force,), n, f"{where}: force")
+    if isinstance(data.velocity, SecondOrder) and data.velocity.force:
+        _require(data, at, data.velocity.force, n, f"{where}: force")
     shapes = dict(data.states.shapes)
     for name, terms in data.rates:
         _require(data, at, terms, len(entry_names(name, shapes[name])), f"{where}: rates of {name}")

@@ -47,7 +47,7 @@ def ocp(
     drift: ArrayLike | None = None,
     dynamics: str = "first_order",
     inertia: ArrayLike | None = None,
-    force: Term | None = None,
+    force: Terms | None = None,
     drag: ArrayLike | None = None,
     allocation: ArrayLike | None = None,
     stage_cost: Terms | None = None,
@@ -83,7 +83,7 @@ def ocp(
         drift: (n,) constant part of the velocity.
         dynamics: "first_order"; or "second_order": a state xi, I xi' = ad*_xi I xi - drag xi + force + B u.
         inertia: of the second order: a number, (n,) or (n, n), positive definite.
-        force: further body force, n entries, of X, xi, t and parameters.
+        force: further body force, n entries, of X, xi, t and parameters; or one text a component.
         drag: linear drag: a number, (n,) or (n, n).
         allocation: (n, m) B, instead of `controls`.
         stage_cost, terminal_cost: l and phi. One text is a scalar. A sequence of texts, or a Kernel with the output
@@ -160,7 +160,7 @@ def _dynamics(
     rates: Mapping[str, Terms] | None,
     drift: ArrayLike | None,
     inertia: ArrayLike | None,
-    force: Term | None,
+    force: Terms | None,
     drag: ArrayLike | None,
     allocation: ArrayLike | None,
 ) -> tuple[dict[str, Any], Any, dict[str, Any], dict[str, tuple[Term, ...]]]:
@@ -193,7 +193,9 @@ def _dynamics(
         raise InputError(f"{where}: dynamics='second_order' needs inertia=")
     metric = np.array(positive_matrix(inertia, group.dim, "inertia").tolist(), dtype=float)
     resistance = np.zeros((group.dim, group.dim)) if drag is None else _matrix(drag, group.dim, "drag", where)
-    law = SecondOrder(_rows(metric), _rows(np.linalg.inv(metric)), _rows(resistance), _rows(columns), force)
+    law = SecondOrder(
+        _rows(metric), _rows(np.linalg.inv(metric)), _rows(resistance), _rows(columns), _sequence(force or ())
+    )
     return own_inputs, law, {"xi": group.dim, **own_states}, own_rates
 
 

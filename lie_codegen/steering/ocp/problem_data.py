@@ -47,14 +47,14 @@ class SecondOrder:
         inertia, inverse: (n, n) I and its inverse.
         drag: (n, n).
         columns: (n, m) B.
-        force: further body force, or None.
+        force: further body force, n entries in all; () for none.
     """
 
     inertia: Rows
     inverse: Rows
     drag: Rows
     columns: Rows
-    force: Term | None
+    force: tuple[Term, ...]
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,9 @@ class ProblemData:
         total = ad_star(at.ops, self.group.algebra, xi, matvec(_constants(law.inertia), xi))
         total = plus(total, matvec(_constants(law.columns), at.values["input"]))
         total = plus(total, scaled(-1, matvec(_constants(law.drag), xi)))
-        if law.force is not None:
-            total = plus(total, self.scope.evaluate(law.force, at, "any", "force"))
+        if law.force:
+            pushed = [entry for term in law.force for entry in self.scope.evaluate(term, at, "any", "force")]
+            total = plus(total, pushed)
         return matvec(_constants(law.inverse), total)
 
     def cost(self, parts: tuple[Cost, ...], at: Point, where: str) -> tuple[Any, Vector]:
