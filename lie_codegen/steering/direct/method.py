@@ -81,7 +81,7 @@ def direct(
         starts: first guesses a round.
         rounds: rounds, with new guesses, before the goal counts as not found.
         pieces: of constant controls in the search, 48 (32 on large groups) if not given.
-        iterations: most steps of each start in each stage.
+        iterations: most steps of each start in each stage; twice, three times ... as many to reach in later rounds.
         seed: of the guesses; the same seed, the same answer.
         polish: whether the controls become continuous (energy); else they stay constant on each piece.
         longest: for "time": the longest duration allowed, in units of the given one.

@@ -24,6 +24,8 @@ Array = NDArray[Any]
 _ROUNDS = 6
 _STILL = 1e-5
 _MOST_NODES = 384
+#: Steps of the descent on each grid, and the dimension above which the grids end earlier.
+_ITERATIONS, _SMALL = 60, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,8 @@ def polished(
     values = np.concatenate([own[:1], (own[1:] + own[:-1]) / 2, own[-1:]])
     speed = _speed(task, own)
     goal = task.goal(np.array([variant]))
-    settings = replace(settings, relative=1e-9)
+    settings = replace(settings, relative=1e-9, descend_iterations=min(_ITERATIONS, settings.descend_iterations))
+    most = _MOST_NODES if task.system.group.dim <= _SMALL else _MOST_NODES // 3
     last = np.inf
     while True:
         programme = linear_pieces(task, pieces, speed)
@@ -116,7 +119,7 @@ def polished(
         if not residual <= 1e-8:
             raise PolishError
         # what is left above the continuum is about a seventh of the last gain
-        if abs(last - now) <= 7 * _STILL * now or 2 * pieces > _MOST_NODES:
+        if abs(last - now) <= 7 * _STILL * now or 2 * pieces > most:
             return found, programme, pieces
         last, u = now, found
         own = task.own(found)

@@ -13,12 +13,12 @@ from lie_codegen.steering.direct.assemble import Manoeuvre
 Array = NDArray[Any]
 
 #: Sizes of the waves, in units of the bounds: larger ones start at the bounds and stay there (measured on two-qubit gates).
-_SIZES = (0.3, 0.15, 0.5, 0.05)
+_SIZES = (0.3, 0.15, 0.6, 0.1)
 _WAVES = 4
 
 
 def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> Array:
-    """(lanes, pieces, m): in turn smooth and white; the very first is zero, moved into the bounds."""
+    """(lanes, pieces, m): white, both, white, smooth in turn; the very first is zero, moved into the bounds."""
     rng = np.random.default_rng([seed, round_])
     middle, half = _box(task)
     s = (np.arange(pieces) + 0.5) / pieces
@@ -30,12 +30,12 @@ def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> 
         white = rng.uniform(-1, 1, (pieces, task.controls))
         # a motion to one side needs a mean: it is drawn apart from the wave
         mean = rng.uniform(-1, 1, task.controls)
+        # white noise arrives where smooth waves stall at the bounds (gates in short time), and the other way round (one in four)
+        kind = (white, white + 0.3 * (smooth + mean), white, smooth + mean)[lane % 4]
         if lane == 0 and round_ == 0:
             found.append(np.zeros((pieces, task.controls)))
-        elif lane % 2:
-            found.append(middle + size * half * white)
         else:
-            found.append(middle + size * half * (smooth + mean))
+            found.append(middle + size * half * kind)
     return np.clip(np.array(found), task.low, task.high)
 
 
