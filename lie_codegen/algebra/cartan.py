@@ -14,19 +14,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.structure import structure
 from lie_codegen.algebra.subspace import annihilated, brackets, contains, span, unit
+from lie_codegen.arrays import Array
 from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import domain_matrix, is_positive_definite, to_numbers
-
-Array = NDArray[Any]
 
 _STEPS = 40
 #: Relative residual of the checks beyond which a numeric result is refused; generic bases of condition 10^3 end at 1e-9.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas
 from lie_codegen.averaging.averaged import average
 from lie_codegen.errors import AssumptionError, InputError, ShapeError
@@ -15,8 +15,6 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
 from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
-
-Array = NDArray[np.float64]
 
 
 def wheel_input(wheels: MomentumWheels, wheel_rates: PeriodicInput) -> PeriodicInput:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas, moments
 from lie_codegen.averaging.floquet import floquet_magnus
 from lie_codegen.averaging.nilpotent import nilpotency_step
@@ -21,8 +22,6 @@ from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of
-
-Array = NDArray[Any]
 
 #: form -> the orders it has.
 FORMS = {"floquet": None, "product": (1, 2), "single": (1, 2, 3)}

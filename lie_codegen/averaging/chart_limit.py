@@ -6,16 +6,12 @@ Theorem 4 that exp be one-to-one near Zbar(t). The secular part is linear in tim
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.averaging.averaged import Averaged
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 _SAMPLES = 400
 

@@ -17,6 +17,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
@@ -28,8 +29,6 @@ from lie_codegen.signals.input_formulas import TIME, period_of
 from lie_codegen.signals.signal_values import expressions_of
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
 from lie_codegen.signals.trig_signal import TrigCalculus
-
-Array = NDArray[np.float64]
 
 _MARGIN = 1e-9
 

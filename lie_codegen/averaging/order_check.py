@@ -5,11 +5,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.averaging.averaged import Averaged, average
 from lie_codegen.averaging.chart_limit import chart_end
 from lie_codegen.errors import AssumptionWarning, InputError
@@ -17,8 +16,6 @@ from lie_codegen.flow.attitude_metrics import METRICS, distances
 from lie_codegen.flow.reference_flow import ReferenceFlow, reference_flow
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.periodic_input import PeriodicInput
-
-Array = NDArray[Any]
 
 #: state(eps, t) -> (k, d, d)
 State = Callable[[float, Array], Array]

@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

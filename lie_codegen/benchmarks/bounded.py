@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lie_codegen.benchmarks.bounded_cases import Array, BoundedCase, bounded_cases
+from lie_codegen.arrays import Array
+from lie_codegen.benchmarks.bounded_cases import BoundedCase, bounded_cases
 from lie_codegen.benchmarks.bounded_peers import PEERS, Start
 from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.batched_exponential import expm

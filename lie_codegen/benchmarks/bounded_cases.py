@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import group as catalogue_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.pauli import pauli
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

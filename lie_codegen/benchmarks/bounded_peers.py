@@ -6,13 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.bounded_cases import BoundedCase
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.batched_exponential import expm
 
-Array = NDArray[Any]
 #: One start: (target, seed) -> constant controls (N, m), or None where it failed.
 Start = Callable[[Array, int], Array | None]
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.benchmarks import peers as peers
 from lie_codegen.benchmarks.rows import Entrant, Row, Work, compete
 from lie_codegen.groups.catalogue_load import group as load
@@ -17,8 +18,6 @@ from lie_codegen.groups.maps.commutator_free import commutator_free_step
 from lie_codegen.groups.maps.rkmk import rkmk4_step
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.formula_input import fourier_input
-
-Array = np.ndarray[Any, Any]
 
 STEPS, H, KEPT = 20_000, 1e-3, 100
 _LONG = 10**6

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.benchmarks import peers as peers
 from lie_codegen.benchmarks.limits import reading
 from lie_codegen.benchmarks.rows import AbsentError, Entrant, Row, Work, compete
@@ -25,8 +26,6 @@ SMALL, LARGE = 4_096, 1_000_000
 JAX_LIMIT, NUMBA_LIMIT = 600, 1500
 #: (v, w) in the order (w, v) of our se3, for the peers.
 _SWAP = [3, 4, 5, 0, 1, 2]
-
-Array = np.ndarray[Any, Any]
 
 
 def kernel_rows(kernel: Kernel, folder: Path, rounds: int, hand: ctypes.CDLL) -> list[Row]:

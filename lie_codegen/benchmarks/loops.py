@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.benchmarks import peers as peers
 from lie_codegen.benchmarks.diffrax_peer import diffrax_solve
 from lie_codegen.benchmarks.rows import AbsentError, Entrant, Row, Work, compete
@@ -18,8 +19,6 @@ from lie_codegen.groups.maps.rkmk import wei_norman_step
 from lie_codegen.kernel.casadi_arithmetic import function_of
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.formula_input import fourier_input
-
-Array = np.ndarray[Any, Any]
 
 STEPS, H = 10_000, 1e-3
 COUNT, SHORT = 2_000, 200

@@ -15,19 +15,16 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.steering_cases import Case, Problem, Solver, cases, problem
 from lie_codegen.benchmarks.steering_crocoddyl import crocoddyl_row
 from lie_codegen.benchmarks.steering_opti import expert_opti_row, plain_opti_row
 from lie_codegen.benchmarks.steering_ours import shooting_row, transcription_row
 from lie_codegen.benchmarks.steering_rockit import rockit_row
 from lie_codegen.benchmarks.steering_scipy import slsqp_row
-
-Array = NDArray[Any]
 
 _EVERYBODY: dict[str, Callable[[Problem], Solver]] = {
     "shooting in C": shooting_row,

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.catalogue_load import group as load
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.constraints import Ball, Cone
 from lie_codegen.steering.shooting.shooter import shooter
-
-Array = NDArray[Any]
 
 #: Actuated basis elements of each system.
 SYSTEMS = {"h3": (0, 1), "se2": (0, 1), "so3": (0, 1), "se3": (0, 1, 2, 3)}

@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from lie_codegen.benchmarks.steering_cases import INTERVALS, Case, Problem, Solver
 from lie_codegen.flow.metric import distance, element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 _NEAR = 1e-3
 

@@ -7,16 +7,12 @@ single: d^, the 1-norm of the difference of logarithms, (53).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ChartError, InputError
 from lie_codegen.flow.batched_exponential import expm, logm
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 METRICS = ("frobenius", "product", "single", "angle")
 _ON_CHART = 1e-8

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ChartError
 from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
 
-Array = NDArray[Any]
 #: (first, last) -> u at the start, the middle and the end of these steps, and their lengths.
 Samples = Callable[[int, int], tuple[Array, Array, Array, Array]]
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.chandrupatla import roots
-
-Array = NDArray[Any]
 
 #: Where g is looked at within a step, beside its ends: at no rational part of it.
 INNER = np.array([0.3090169943749474, 0.7071067811865476])

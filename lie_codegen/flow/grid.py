@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.inputs import Signal
 from lie_codegen.runtime.drive import Spans
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 from lie_codegen.signals.resolved_input import resolve_function
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

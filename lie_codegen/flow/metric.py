@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.flow.chart import mismatch, newton
 from lie_codegen.flow.libraries import integrators, logarithms
 from lie_codegen.groups.maps.admission import Admitted, admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 #: Nearer to the identity than this the series of the logarithm to third order is exact to rounding.
 _NEAR = 1e-5

@@ -8,17 +8,15 @@ X(t + T) = X(T) X(t), gives the rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.periodic_input import PeriodicInput
-
-Array = NDArray[Any]
 
 _AGREEMENT = 2e-14
 _MOST_STEPS = 2**17

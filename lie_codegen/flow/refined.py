@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.grid import Grid, refine
 from lie_codegen.flow.inputs import Signal
 from lie_codegen.flow.rollout import rollout
 from lie_codegen.runtime.call import Compiled
-
-Array = NDArray[Any]
 
 #: |h u| and w h (of the fastest sine) that a step may span.
 _LARGEST_STEP, _LARGEST_ANGLE = 0.25, 1.0

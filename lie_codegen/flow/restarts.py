@@ -7,18 +7,15 @@ at g = 0, or where |M(g)| has grown tenfold (finite escape, or plainly a long wa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ChartError
 from lie_codegen.flow.chart import Samples, newton
 from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 _SMALLEST_DETERMINANT = 0.25
 _LARGEST_GROWTH = 10.0

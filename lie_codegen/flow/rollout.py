@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError
 from lie_codegen.flow.grid import Grid, sample
 from lie_codegen.flow.inputs import Signal
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.drive import driven_loop
-
-Array = NDArray[Any]
 
 #: Steps for which u is sampled at once.
 BLOCK = 16_384

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.events import Event, event_function
 from lie_codegen.flow.events import Function as EventFunction
@@ -19,8 +20,6 @@ from lie_codegen.flow.refined import refined
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
-
-Array = NDArray[Any]
 
 _FOURTH_ORDER = ("rkmk4", "commutator_free")
 METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.chart import Samples, follow_chart
 from lie_codegen.flow.events import EventHits
@@ -21,8 +21,6 @@ from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.flow.refined import refined
 from lie_codegen.flow.restarts import Chart, restarted_charts
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 _WHOLE = np.array([0.0, 0.5, 1.0])
 

@@ -21,14 +21,13 @@ from typing import Any
 import casadi as ca
 import mpmath
 import numpy as np
-from numpy.typing import NDArray
 
 from lie_codegen import __version__
+from lie_codegen.arrays import Array
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.kernels import group_kernel
 from lie_codegen.kernel.casadi_arithmetic import function_of
 
-Array = NDArray[np.float64]
 #: (x, u, v) -> f, Df u, D^2 f (u, v), flat.
 Derivatives = Callable[[Array, Array, Array], Sequence[Any]]
 

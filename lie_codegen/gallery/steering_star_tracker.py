@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, save
@@ -18,8 +17,6 @@ from lie_codegen.pictures.steering_picture import draw_plan
 from lie_codegen.steering.constraints import Cone
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 _TARGET = (0.4, -0.3, 1.2)
 _CONTROLS = ("w1", "w2")

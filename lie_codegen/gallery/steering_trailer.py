@@ -17,16 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
 from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 _LENGTH = 1.0
 _SIDEWAYS = 1.0

@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.gallery.attitude_style import BLUE, COLOURS, RED, bare_3d, quiet, sphere
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-
-Array = NDArray[Any]
 
 #: Where the paths start and end: latitude and longitude [rad].
 _FROM, _TO = (0.25, -0.2), (0.85, 2.0)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -28,7 +29,6 @@ from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback, desi
 from lie_codegen.mechanics.vibrational_fields import vibrational_fields
 from lie_codegen.mechanics.vibrational_law import closed_loop_start, feedback_kernels
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.runtime.broadcast import Array
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _P, _RATIO, _OMEGA, _K1, _K2 = 2.00102, 0.05, 50.0, 0.7, -2.1

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.mechanics.lagrangian import LagrangianSystem, lagrangian_system
 from lie_codegen.mechanics.routh import RouthReduction, routh_reduce
 from lie_codegen.mechanics.vibrational_average import vibrational_average
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.runtime.broadcast import Array
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPSILONS = (0.004, 0.002, 0.001, 0.0005)

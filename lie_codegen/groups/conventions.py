@@ -23,13 +23,12 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
 from lie_codegen.groups.maps.admission import NEAR_GROUP, ON_GROUP
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[np.float64]
 
 #: library -> group -> our labels in the library's order.
 TANGENT_ORDERS = MappingProxyType(

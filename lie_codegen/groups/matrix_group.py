@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lie_codegen.algebra.constructions import permutation, reorder_algebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
 from lie_codegen.kernel.definition import Definition, definition_of
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

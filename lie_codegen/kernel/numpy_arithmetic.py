@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError
 from lie_codegen.kernel.kernel import Kernel, Port
-
-Array = NDArray[np.float64]
 
 
 class NumpyArithmetic:

@@ -15,15 +15,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lie_codegen.arrays import Array
 from lie_codegen.errors import CodegenError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.kernel import Kernel
 
-Array = NDArray[np.float64]
 #: tangent(ops, inputs, outputs, input rates) -> output rates.
 Tangent = Callable[[Arithmetic, Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]], list[Scalar]]
 

@@ -7,8 +7,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.grid import Grid, refine, sample
 from lie_codegen.flow.inputs import Signal, as_signal
@@ -21,8 +22,6 @@ from lie_codegen.runtime.library import Library
 
 if TYPE_CHECKING:
     from lie_codegen.kernel.kernel import Kernel
-
-Array = NDArray[Any]
 
 _LARGEST_MOVE = 0.25
 _MOST_STEPS = 2**21

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
@@ -18,7 +19,7 @@ from lie_codegen.mechanics.routh import RouthReduction
 from lie_codegen.mechanics.vector_fields import Field
 from lie_codegen.mechanics.vibrational_fields import VibrationalFields, vibrational_fields
 from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
-from lie_codegen.runtime.broadcast import Array, broadcast_call
+from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
 

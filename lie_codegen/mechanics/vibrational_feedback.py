@@ -19,11 +19,11 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.mechanics.relative_equilibria import newton, parameter_numbers
 from lie_codegen.mechanics.vibrational_fields import FAST, VibrationalFields
 
-Array = NDArray[np.float64]
 _AUTHORITY = 1e-8
 
 

@@ -6,13 +6,11 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 COLOURS = ("#1f5aa6", "#c8442f", "#3c8d5a", "#8a5aa6", "#b08a2e", "#5b6470")
 GREY = "#8a8f98"

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ChartError
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.steering_loops import COLOURS, GREY
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 _FRAMES = 12
 

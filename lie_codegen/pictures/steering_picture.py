@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.pictures.result import new_figure
@@ -15,8 +15,6 @@ from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
 from lie_codegen.pictures.steering_path import draw_path
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 _SAMPLES = 1201
 

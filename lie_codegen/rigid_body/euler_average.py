@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.elliptic import nome
@@ -18,7 +19,7 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.rigid_body import euler_kernels
 from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_perturbation
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, check_slow
-from lie_codegen.runtime.broadcast import Array, broadcast_call
+from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 
 NAMESPACE = "euler_average"

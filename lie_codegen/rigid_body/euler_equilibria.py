@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS, jacobi, ladder
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU
-from lie_codegen.runtime.broadcast import Array
 
 
 @dataclass(frozen=True)

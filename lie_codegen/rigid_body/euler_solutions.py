@@ -10,13 +10,13 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
-from lie_codegen.runtime.broadcast import Array
 
 
 @dataclass(frozen=True)

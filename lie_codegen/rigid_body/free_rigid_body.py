@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.rigid_body import euler_kernels
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody, principal_body
-from lie_codegen.runtime.broadcast import Array, broadcast_call
+from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 
 NAMESPACE = "rigid_body"

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import ShapeError
 from lie_codegen.kernel.kernel import Port
-
-Array = np.ndarray[Any, Any]
 
 REAL = np.dtype(np.float64)
 COMPLEX = np.dtype(np.complex128)

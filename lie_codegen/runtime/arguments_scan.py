@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.runtime.arguments import Array, as_array
+from lie_codegen.runtime.arguments import as_array
 
 Strides = tuple[int, int]
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError
 from lie_codegen.runtime.call import Compiled
-
-Array = NDArray[np.float64]
 
 
 def broadcast_call(function: Compiled, *arguments: ArrayLike) -> tuple[Array, ...]:

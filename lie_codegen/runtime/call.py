@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, is_step, python_field
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.runtime.arguments import Array, bind, checked, describe, dtype_of, outputs_for, sequences, unshared
+from lie_codegen.runtime.arguments import bind, checked, describe, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.threads import in_parts

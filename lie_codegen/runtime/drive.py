@@ -11,11 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, InputError, ShapeError
 from lie_codegen.kernel.kernel import Port
-from lie_codegen.runtime.arguments import Array, dtype_of
+from lie_codegen.runtime.arguments import dtype_of
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend, load_library
 from lie_codegen.runtime.formula_input import FormulaInput

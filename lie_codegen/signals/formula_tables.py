@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.runtime.formula_input import FormulaInput, fourier_input, lines_input
 from lie_codegen.signals.piecewise_waveform import PiecewiseWaveform
 from lie_codegen.signals.signal_values import SignalTable, table_of
 from lie_codegen.signals.waveform import TrigWaveform, Waveform
-
-Array = NDArray[np.float64]
 
 _DIGITS = 50
 

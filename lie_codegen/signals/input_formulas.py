@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.signals.sampled_signal import resolve
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
 from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform
-
-Array = NDArray[np.float64]
 
 #: The time in every formula.
 TIME = sp.Symbol("t", real=True)

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.formula_tables import periodic_formula
@@ -32,8 +33,6 @@ from lie_codegen.signals.trig_formula import NotTrigonometricError
 from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
 
 __all__ = ["TIME", "PeriodicInput"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

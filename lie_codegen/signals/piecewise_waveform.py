@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.piecewise_signal import Pieces, PiecewiseCalculus, ring_values
@@ -17,8 +17,6 @@ from lie_codegen.signals.signal_values import expressions_of, table_of
 from lie_codegen.signals.trig_formula import Census, NotTrigonometricError, Reader, base_rate
 from lie_codegen.signals.trig_signal import Brackets, TrigCalculus, TrigSignal
 from lie_codegen.signals.waveform import moved
-
-Array = NDArray[np.float64]
 
 #: Time within a piece.
 _LOCAL = sp.Symbol("s", real=True)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError
-
-Array = NDArray[np.float64]
 
 TERMS = 9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(TERMS)

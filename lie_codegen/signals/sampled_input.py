@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.runtime.formula_input import FormulaInput, lines_input
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.signals.trig_signal import Brackets
-
-Array = NDArray[np.float64]
 
 #: Nodes of a panel.
 NODES = 24
@@ -54,7 +53,8 @@ class Panels:
     def nodes(self) -> Array:
         """(p, NODES) times."""
         halves = np.diff(self.edges)[:, None] / 2
-        return self.edges[:-1, None] + halves * (_rules()[0] + 1)
+        nodes: Array = self.edges[:-1, None] + halves * (_rules()[0] + 1)
+        return nodes
 
     def primitive(self, values: Array) -> Array:
         """int_0^t at the nodes: (p, NODES, n) -> (p, NODES, n)."""

@@ -10,11 +10,10 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.trig_signal import TrigSignal
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.sampled_signal import Panels, SampledCalculus
@@ -20,7 +20,6 @@ from lie_codegen.signals.trig_formula import TrigForm
 from lie_codegen.signals.trig_signal import Brackets, TrigCalculus, TrigSignal
 from lie_codegen.signals.trigonometric import add_scaled, clean
 
-Array = NDArray[np.float64]
 Signal = Any
 Calculus = Any
 

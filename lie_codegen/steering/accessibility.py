@@ -7,14 +7,12 @@ in long enough time on a compact group (Jurdjevic and Sussmann, J. Differential 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.arrays import Array
 
-Array = NDArray[Any]
 Product = Callable[[Array, Array], Array]
 
 _RANK = 1e-9

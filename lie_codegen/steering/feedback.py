@@ -15,8 +15,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, ShapeError, SteeringError, SteeringInputError
 from lie_codegen.flow.metric import distance, element_coordinates
 from lie_codegen.flow.simulate import simulate
@@ -25,8 +26,6 @@ from lie_codegen.steering.methods import OPEN_LOOP, plan_by, solver_of
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.seeds import area_rule_seed
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _SMALL_ENOUGH = 1.0
 #: A remainder that small is left to the area rule where the planner refuses it.

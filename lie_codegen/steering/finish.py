@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.metric import distance
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _NODES, _WEIGHTS = leggauss(10)
 _PANELS = 400

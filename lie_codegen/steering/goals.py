@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError, SteeringInputError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 
-Array = NDArray[Any]
 Numbers = tuple[Any, ...]
 
 #: A gate that is nearer to a unitary one (printed with a few digits) counts as that one.

@@ -13,11 +13,11 @@ import operator
 import time
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, PlanOnDemand, Status
@@ -25,8 +25,6 @@ from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import SOLVED, Extremals
 from lie_codegen.steering.shooting.shooter import Shooter, shooter
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _MORE = 10
 #: A cheapest extremal that no more starts than these found is searched for again (SL(2): 4 of 60 were not the cheapest, then none).

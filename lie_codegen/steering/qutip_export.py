@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import MissingDependencyError, SteeringInputError
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 
 def qutip_evolution(plan: Plan) -> tuple[Any, Array]:

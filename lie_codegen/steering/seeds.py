@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.metric import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _SEED = 5
 _QUIET = 8

@@ -8,16 +8,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lie_codegen.algebra.controllability import Controllability, control_indices, controllability
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.accessibility import with_drift
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

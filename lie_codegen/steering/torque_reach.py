@@ -7,16 +7,12 @@ the symmetric products <x : y> = -J^-1 (ad*_x J y + ad*_y J x) of the Y_a = J^-1
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.accessibility import bracket_of, closure
-
-Array = NDArray[Any]
 
 _RANK = 1e-8
 

@@ -237,8 +237,9 @@ def test_the_store_is_current() -> None:
 
 @pytest.mark.parametrize("name", FAST)
 def test_the_store_holds_what_the_generator_writes(name: str) -> None:
-    made = prebuild.derived(name)
-    assert prebuild.unpack(prebuilt_folder() / f"{name}.json.xz") == made["store"], COMMAND
+    made, kept = prebuild.derived(name), prebuild.unpack(prebuilt_folder() / f"{name}.json.xz")
+    # What ran may have grown by a module that is imported for a type; `stale` judges whether that matters.
+    assert {**kept, "made_from": None} == {**made["store"], "made_from": None}, COMMAND
     assert prebuild.unpack(prebuilt_folder() / f"{prebuilt.SHARED_STORE}.json.xz") == made["shared"], COMMAND
 
 
@@ -328,9 +329,9 @@ def test_an_edit_makes_those_groups_stale_that_are_made_from_it(
         "so3",
         "h3",
     }
-    assert stale_after("groups/maps/log_blocks.py", lambda text: text.replace("1 + ops.sqrt", "2 + ops.sqrt")) == {
-        "so3"
-    }
+    assert stale_after(
+        "groups/maps/log_blocks.py", lambda text: text.replace("q0 * q0 + square", "square + q0 * q0")
+    ) == {"so3"}
 
 
 def test_a_stale_store_changes_nothing_but_time(

@@ -14,7 +14,7 @@ import lie_codegen
 
 #: From the ground up; imports point down (or stay on their floor), lazy ones and those for type checkers included.
 LAYERS = (
-    "errors", "identifiers", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
+    "errors", "identifiers", "arrays", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
     "control", "vehicles", "rigid_body", "averaging", "steering", "studies", "pictures", "gallery", "benchmarks", "cli",
 )  # fmt: skip
 PACKAGE = Path(lie_codegen.__file__).parent

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.resolved_input import ResolvedInput
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

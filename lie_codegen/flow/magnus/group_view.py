@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[np.float64]
 
 #: Up to this dimension brackets come from structure constants, unrolled; above, as products of matrices (measured on su4, su8).
 MOST_UNROLLED = 15

@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError
 from lie_codegen.flow.magnus.drive import Drive
@@ -16,8 +16,6 @@ from lie_codegen.flow.magnus.steps import Steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
-
-Array = NDArray[Any]
 
 #: Plain C, beside the header that is made for the group.
 _FILES = ("magnus.c", "magnus_lanes.h", "magnus_input.h", "magnus_exponent.h", "magnus_move.h")

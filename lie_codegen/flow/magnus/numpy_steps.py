@@ -5,16 +5,12 @@ Signs are those of X' = X A: the printed right-invariant formulas with c(a, b) =
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.steps import Steps
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 #: Gauss-Legendre nodes in a step: enough for the moments of one radian of a sine to rounding.
 _NODES, _WEIGHTS = (each / 2 for each in np.polynomial.legendre.leggauss(10))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.magnus import numpy_steps
 from lie_codegen.flow.magnus.drive import Drive
@@ -15,8 +14,6 @@ from lie_codegen.flow.magnus.library import MagnusLibrary, magnus_library
 from lie_codegen.flow.magnus.steps import Steps, plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.threads import share_out
-
-Array = NDArray[Any]
 
 #: method -> order.
 ORDERS = {"magnus4": 4, "magnus6": 6, "magnus8": 8}

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive
 
-Array = NDArray[Any]
 Counts = NDArray[np.intp]
 
 

@@ -14,8 +14,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.groups.derivation import GroupDerivation
@@ -27,8 +28,6 @@ from lie_codegen.kernel.complex_scalar import Complex
 
 if TYPE_CHECKING:
     from lie_codegen.runtime.library import Library
-
-Array = NDArray[Any]
 
 #: On the group to rounding, relative to kappa.
 ON_GROUP = 1e-12

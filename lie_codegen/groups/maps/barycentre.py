@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.values import Value
-
-Array = NDArray[Any]
 
 #: The iteration converges linearly at worst, with the square of the spread of the data as its rate: this is far beyond.
 _MOST_STEPS = 200

@@ -15,15 +15,12 @@ the other factor. Along X' = X hat(u + w), w white of density Q: S' = -ad_u S - 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 
 @lru_cache(maxsize=32)

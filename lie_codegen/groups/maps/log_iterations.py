@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
 
 
 def unitary_log(X: Array, *, special: bool) -> Array:

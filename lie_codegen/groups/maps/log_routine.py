@@ -24,6 +24,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect, largest
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
@@ -38,8 +39,6 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matmul, matvec, total
 from lie_codegen.kernel.routine import Routine, call_routine
-
-Array = NDArray[np.float64]
 
 #: The defect up to which a closed form is taken as it is: rounding.
 _ROUNDING = 1e-13

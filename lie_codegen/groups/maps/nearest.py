@@ -19,14 +19,13 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.optimize
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.catalogue_load import group as load_group
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 _STEPS = 200
 _HALVINGS = 40

@@ -5,11 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError, SpreadWarning
 from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
@@ -17,8 +18,6 @@ from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.covariance import ad_matrices, compounded, flowed, transported
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.values import Value
-
-Array = NDArray[Any]
 
 _MOST_STEPS = 50
 _SETTLED = 1e-13

@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.steering.closed_form.averaged_end import TABULATED, averaged_end
 from lie_codegen.steering.closed_form.chain import Chain
@@ -23,8 +23,6 @@ from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.extremals import SOLVED
 from lie_codegen.steering.shooting.shooter import shooter
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _SAMPLES = 65
 _SHARP = 1e-13

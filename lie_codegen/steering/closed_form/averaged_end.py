@@ -11,16 +11,13 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.closed_form.fourier import Family
-
-Array = NDArray[Any]
 
 #: Orders up to which the averaged endpoint is a tabulated polynomial.
 TABULATED = 3

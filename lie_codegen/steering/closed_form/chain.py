@@ -8,14 +8,12 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.closed_form.endpoint import flow_end, retune
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop, Segment, Straight
 from lie_codegen.steering.plan import Controls
-
-Array = NDArray[Any]
 
 _NEGLIGIBLE = 1e-9
 _STEPS = 32

@@ -15,21 +15,18 @@ from __future__ import annotations
 
 import operator
 import time
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.steering.closed_form.endpoint import approach, flow_end, sharpen
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.seeds import coordinates
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _NEGLIGIBLE = 1e-12
 _ROUNDING = 1e-28

@@ -21,16 +21,14 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
 from lie_codegen.flow.metric import matrix_log, second_kind
 from lie_codegen.steering.closed_form.free_amplitude import LineAndCircles, free_amplitude
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
-
-Array = NDArray[np.float64]
 
 _NEGLIGIBLE = 1e-12
 #: Periods that the paper's loops may take unasked; where gd_i gd_j is small they take any number, at any speed.

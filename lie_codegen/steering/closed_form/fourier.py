@@ -10,15 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.closed_form.endpoint import flow_end
-
-Array = NDArray[Any]
 
 _STEPS_A_HARMONIC = 32
 _MOST_FACTOR = 8  # a solver may try controls of any size

@@ -13,12 +13,10 @@ speed. The paper's own four phases (`four_phase`) have the loop's shape tied to 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from lie_codegen.errors import SteeringError, SteeringInputError
@@ -16,8 +14,6 @@ from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.seeds import coordinates
 from lie_codegen.steering.task import Task
-
-Array = NDArray[Any]
 
 _DEEPEST = 2
 _EXACT = 1e-11

@@ -16,14 +16,12 @@ The energy is 2 pi^2 (alpha^2 + 4 beta^2), least at alpha^2 = 8 beta^2, |beta| =
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
-
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
 
 _TINY = 1e-9
 

@@ -16,16 +16,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringInputError
 from lie_codegen.flow.metric import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
-
-Array = NDArray[np.float64]
 
 _TINY = 1e-15
 

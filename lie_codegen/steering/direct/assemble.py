@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.programme import Goal, Programme
 from lie_codegen.steering.direct.system import System
 from lie_codegen.steering.goals import End
-
-Array = NDArray[Any]
 
 _EARLY, _LATE = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
 _GAUSS = 0.5 + np.array([-1, 1]) * math.sqrt(3) / 6

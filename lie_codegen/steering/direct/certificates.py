@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.goals import has_positions
-
-Array = NDArray[Any]
 
 _MOST_CONTROLS = 10
 #: Relative margin, so that rounding proves nothing.

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.steering.direct.programme import Goal, Programme
-
-Array = NDArray[Any]
 
 
 def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:

@@ -7,15 +7,12 @@ with the signs of a velocity that acts from the right); the steps are halved unt
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.steering.direct.inputs import Drive
-
-Array = NDArray[Any]
 
 _AGREE = 1e-13
 _MOST = 256

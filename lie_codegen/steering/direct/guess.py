@@ -6,13 +6,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 
 def guessed(task: Manoeuvre, guess: Any, pieces: int) -> Array | None:

@@ -15,8 +15,9 @@ from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringError, SteeringInputError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
@@ -28,8 +29,6 @@ from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Sett
 from lie_codegen.steering.direct.report import plan_of
 from lie_codegen.steering.direct.search import threshold
 from lie_codegen.steering.plan import Plan
-
-Array = NDArray[Any]
 
 #: Words of n arcs are all tried up to that many; else as many drawn at random.
 _MOST_WORDS = 1024

@@ -12,8 +12,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InfeasibleError, ShapeError, SteeringError, SteeringInputError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
@@ -32,8 +33,6 @@ from lie_codegen.steering.direct.search import Budget, Found, search
 from lie_codegen.steering.direct.system import System, controls_of, velocity
 from lie_codegen.steering.goals import end_of
 from lie_codegen.steering.plan import Plan, Status
-
-Array = NDArray[Any]
 
 _OBJECTIVES = ("energy", "fuel", "time", "none")
 _FUEL_TIMES = 4

@@ -8,15 +8,13 @@ semismooth Newton's method on its dual, then a few undamped steps of stage 1 to 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.chain import linearise
 from lie_codegen.steering.direct.programme import Goal, Programme, Reached, Settings, chosen
-
-Array = NDArray[Any]
 
 _LEAST, _MOST = 1e-13, 1e8
 _ROUNDING = 1e-13

@@ -8,18 +8,15 @@ order: the true system is flown, and the goal moved by what it misses, until it 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.flight import fly
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.programme import Machine, Programme, Settings
 from lie_codegen.steering.direct.search import once_more, restored
-
-Array = NDArray[Any]
 
 _ROUNDS = 6
 _STILL = 1e-5

@@ -11,11 +11,9 @@ weights. One slot may drive several exponentials.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
-from numpy.typing import NDArray
-
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

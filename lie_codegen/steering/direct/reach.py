@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from lie_codegen.errors import UncontrollableError
 from lie_codegen.steering.accessibility import bracket_of, closure, independent
 from lie_codegen.steering.direct.system import System
 from lie_codegen.steering.goals import End
-
-Array = NDArray[Any]
 
 _SAMPLES = 7
 

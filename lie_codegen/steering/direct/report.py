@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.metric import distance
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.plan import Controls, Plan, Status
-
-Array = NDArray[Any]
 
 
 def plan_of(

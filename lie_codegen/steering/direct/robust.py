@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces
 from lie_codegen.steering.direct.compiled import machine
@@ -26,8 +26,6 @@ from lie_codegen.steering.direct.report import error_at, fidelity, plan_of
 from lie_codegen.steering.direct.starts import starts as first_controls
 from lie_codegen.steering.direct.system import Velocity, velocity
 from lie_codegen.steering.plan import Plan, Status
-
-Array = NDArray[Any]
 
 #: The energy's share: its mean square counts as much as that share of a squared residual.
 _ENERGY = 1e-5

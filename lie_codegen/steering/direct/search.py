@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
 from lie_codegen.steering.direct.starts import starts, with_free_slots
-
-Array = NDArray[Any]
 
 #: Starts of a round that must arrive before another round is not tried.
 _PLENTY = 4

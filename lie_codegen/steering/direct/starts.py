@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.metric import element_coordinates
 from lie_codegen.steering.direct.assemble import Manoeuvre
-
-Array = NDArray[Any]
 
 #: Sizes of the waves, in units of the bounds: larger ones start at the bounds and stay there (measured on two-qubit gates).
 _SIZES = (0.3, 0.15, 0.6, 0.1)

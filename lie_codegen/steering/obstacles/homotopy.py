@@ -14,9 +14,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
+
 Word = tuple[int, ...]
 
 #: Cells along the longer side, letters of a word beyond one a cluster, and states that are expanded at most.

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.obstacles.homotopy import Discs, Word, resampled, shortest_classes
-
-Array = NDArray[Any]
 
 #: Part of the way over which the heading turns from the start's to the path's, and from the path's to the goal's.
 _EASE = 0.08

@@ -11,9 +11,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
 
 
 def tunnels(obstacles: Sequence[Any], X: Array) -> bool:

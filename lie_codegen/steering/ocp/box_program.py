@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
+
 _EPSILON = float(np.finfo(float).eps)
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import LieCodegenError
 from lie_codegen.flow.metric import distance, group_element
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.terms import Point
-
-Array = NDArray[Any]
 
 
 def end_error(data: ProblemData, X: Array, z: Array, parameters: Array) -> float:

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import group as load_group
@@ -30,7 +31,6 @@ from lie_codegen.steering.ocp.problem_data import (
 )
 from lie_codegen.steering.ocp.terms import Term
 
-Array = NDArray[np.float64]
 Terms = Term | Sequence[Term]
 
 

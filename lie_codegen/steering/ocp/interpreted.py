@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.ocp.box_program import box_program
 from lie_codegen.steering.ocp.interpreted_model import InterpretedModel
 from lie_codegen.steering.ocp.machine_base import EXACT_AT_ONCE, HELD, INPUT, OK, Machine
 from lie_codegen.steering.ocp.model import Model
 from lie_codegen.steering.ocp.problem_data import ProblemData
-
-Array = NDArray[Any]
 
 _LOOSE = (1e-3, 1e-4, 1e-5, 1e-7)
 _LARGEST_PENALTY, _CLEAN_PENALTY = 1e7, 1e5

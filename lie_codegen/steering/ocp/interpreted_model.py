@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.model import Model
 from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
 
-Array = NDArray[Any]
 #: Arguments, their derivatives and the stages' own derivatives, the total and its derivative, the right Jacobian.
 Chain = tuple[list[Array], list[Array], list[Array], Array, Array, Array]
 

@@ -9,12 +9,12 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.identifiers import check_identifier
 
-Array = NDArray[Any]
 #: (), (k,), (r, c); or (d, d, 2) for a complex matrix of a complex group, as (re, im).
 Shape = tuple[int, ...]
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.steering.ocp.machine import loop_machine
 from lie_codegen.steering.ocp.problem import OptimalControlProblem, pack_element, unpack_elements
 
-Array = NDArray[Any]
 #: plant(X, states, u, t, h, rng) -> (X, states) an interval later.
 Plant = Callable[..., tuple[ArrayLike, Mapping[str, ArrayLike]]]
 

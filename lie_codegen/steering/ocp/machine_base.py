@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.ocp.model import Sizes
 from lie_codegen.steering.ocp.problem_data import ProblemData
-
-Array = NDArray[Any]
 
 #: How a sample ended, as the C says it.
 OK, HELD, INPUT = 4, 5, 6

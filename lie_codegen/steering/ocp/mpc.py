@@ -8,8 +8,9 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.steering.ocp.loop import LoopRun, run_loop
 from lie_codegen.steering.ocp.machine import CompiledMachine, loop_machine
@@ -19,8 +20,6 @@ from lie_codegen.steering.ocp.problem import OptimalControlProblem, pack_element
 
 if TYPE_CHECKING:
     from lie_codegen.steering.ocp.machine_base import Machine
-
-Array = NDArray[Any]
 
 _STATUS = {OK: "ok", HELD: "held", INPUT: "input"}
 

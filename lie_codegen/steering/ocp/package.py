@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from lie_codegen.codegen.opcodes import REALS
@@ -21,8 +20,6 @@ from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
 from lie_codegen.steering.ocp.plan import OptimalPlan
 from lie_codegen.steering.ocp.problem import pack_element, unpack_elements
 from lie_codegen.steering.ocp.source import CORE, SolverView, render_solver, solver_view
-
-Array = NDArray[Any]
 
 _SAMPLES = 6
 _NOISE = 0.005

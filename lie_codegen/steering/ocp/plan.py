@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

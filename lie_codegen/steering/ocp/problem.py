@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.maps.element_pattern import varying_entries
@@ -24,8 +25,6 @@ from lie_codegen.steering.ocp.plan import OptimalPlan
 from lie_codegen.steering.ocp.problem_data import Affine, ProblemData
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
-
-Array = NDArray[Any]
 
 _STATUS = (Status.SOLVED, Status.ADMISSIBLE, Status.NOT_ADMISSIBLE, Status.DIVERGED)
 _SPREAD = 0.3

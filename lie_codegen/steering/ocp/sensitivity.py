@@ -13,8 +13,9 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
@@ -25,8 +26,6 @@ from lie_codegen.steering.ocp.machine_base import EXACT_AT_ONCE
 from lie_codegen.steering.ocp.model import ModelBuilder
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.solution import Solution
-
-Array = NDArray[Any]
 
 #: Relative to the largest multiplier, and to the size of what is bounded.
 _WEAK = 1e-6

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
-from numpy.typing import NDArray
-
+from lie_codegen.arrays import Array
 from lie_codegen.steering.ocp.problem_data import ProblemData
-
-Array = NDArray[Any]
 
 
 class Solution(Protocol):

@@ -8,8 +8,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputError
 from lie_codegen.flow.metric import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
@@ -19,8 +20,6 @@ from lie_codegen.steering.ocp.problem import OptimalControlProblem
 from lie_codegen.steering.ocp.problem_data import Affine
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Controls, Plan, Status
-
-Array = NDArray[Any]
 
 #: Options that no other method has.
 _OWN = {"cost", "terminal_cost", "constraints", "parameters"}

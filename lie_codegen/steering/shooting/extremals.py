@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from numpy.typing import NDArray
-
-Array = NDArray[Any]
+from lie_codegen.arrays import Array
 
 #: Values of `Extremals.status`, as in the generated header.
 NOTHING_FOUND, SOLVED, NOT_CONVERGED = 0, 1, 2

@@ -9,14 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.defaults import Defaults
 from lie_codegen.steering.shooting.extremals import Extremals
-
-Array = NDArray[Any]
 
 _SEED_STEPS = 16
 _KEPT = 8

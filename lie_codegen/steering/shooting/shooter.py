@@ -17,17 +17,16 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lie_codegen.algebra.controllability import require_controllable
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import Extremals
-
-Array = NDArray[Any]
 
 _NODES = 32
 

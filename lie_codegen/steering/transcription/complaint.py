@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.flow import fly
 from lie_codegen.steering.transcription.guess import guesses, smooth_torques
 from lie_codegen.steering.transcription.numbers import Numbers, over
 from lie_codegen.steering.transcription.solve import Candidate
 from lie_codegen.steering.transcription.structure import Structure
-
-Array = NDArray[Any]
 
 
 def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Sequence[Candidate]) -> str:

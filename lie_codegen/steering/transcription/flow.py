@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.steering.plan import Controls
 from lie_codegen.steering.transcription.numbers import Numbers
-
-Array = NDArray[Any]
 
 #: States a knot interval at which obstacles are checked.
 FINE = 8

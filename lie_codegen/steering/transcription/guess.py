@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, NotFiniteError, ShapeError
 from lie_codegen.steering.obstacles.homotopy import planar_discs
 from lie_codegen.steering.obstacles.path_guess import PathGuess, moves_in_the_plane, path_guesses
@@ -20,8 +20,6 @@ from lie_codegen.steering.transcription.flow import fly
 from lie_codegen.steering.transcription.layout import joined
 from lie_codegen.steering.transcription.numbers import Numbers, over
 from lie_codegen.steering.transcription.structure import Structure
-
-Array = NDArray[Any]
 
 _NUDGE = 0.02
 _COARSE = 4

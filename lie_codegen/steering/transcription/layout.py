@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.structure import Structure
-
-Array = NDArray[Any]
 
 _RELAXED = 1.05e-8
 

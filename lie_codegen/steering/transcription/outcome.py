@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lie_codegen.steering.obstacles.homotopy import planar_discs
 from lie_codegen.steering.obstacles.path_guess import word_text
@@ -15,8 +14,6 @@ from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.flow import fly
 from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.solve import Candidate
-
-Array = NDArray[Any]
 
 
 def classes_found(

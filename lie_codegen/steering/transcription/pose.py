@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import operator
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.flow.metric import group_element
@@ -16,8 +16,6 @@ from lie_codegen.steering.task import Task
 from lie_codegen.steering.torque_reach import require_torques_reach
 from lie_codegen.steering.transcription.numbers import Dynamics, Numbers, Options
 from lie_codegen.steering.transcription.structure import Structure
-
-Array = NDArray[Any]
 
 #: Solvers; "auto" is fatrop, and ipopt where fatrop cannot or does not.
 SOLVERS = ("auto", "fatrop", "ipopt")

@@ -17,8 +17,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.steering.transcription.listener import Listener
 from lie_codegen.steering.transcription.path import path
@@ -26,8 +26,6 @@ from lie_codegen.steering.transcription.source import compiled
 from lie_codegen.steering.transcription.stage import interval
 from lie_codegen.steering.transcription.structure import KINDS, Structure
 from lie_codegen.steering.transcription.watched_solver import WatchedSolver
-
-Array = NDArray[Any]
 
 #: The violation is asked for below what the check of the true system wants, so that one solve is enough.
 _FATROP = {"print_level": 0, "tol": 1e-8, "constr_viol_tol": 1e-10, "mu_init": 1e-2, "max_iter": 300}

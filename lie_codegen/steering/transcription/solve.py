@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.steering.constraints import Cone
 from lie_codegen.steering.obstacles.tunnels import tunnels
 from lie_codegen.steering.packing import pack_element
@@ -19,8 +19,6 @@ from lie_codegen.steering.transcription.layout import stages_of, tightened, unpa
 from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.problem import Program
 from lie_codegen.steering.transcription.structure import Structure
-
-Array = NDArray[Any]
 
 #: Violations above it are not taken for rounding.
 FEASIBLE = 1e-6

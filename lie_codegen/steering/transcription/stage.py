@@ -16,7 +16,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from lie_codegen.groups.maps.element_pattern import pack, unpack
 from lie_codegen.groups.maps.rkmk import bracket_body, sum_products, times_taylor_exp
@@ -26,8 +25,6 @@ from lie_codegen.mechanics.driven_step import driven_increments
 from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import ad_matrix, push, pushed, wedge
-
-Array = NDArray[Any]
 
 _OPS = CasadiArithmetic()
 _EXPONENTIAL_DEGREE = 9

@@ -14,8 +14,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.metric import distance
 from lie_codegen.steering.constraints import Obstacle
@@ -36,8 +37,6 @@ from lie_codegen.steering.transcription.pose import pose
 from lie_codegen.steering.transcription.problem import endable, program
 from lie_codegen.steering.transcription.solve import Aim, Candidate, Workbench, predicted_aim, refined
 from lie_codegen.steering.transcription.structure import Structure
-
-Array = NDArray[Any]
 
 _FALLBACK = 4
 #: Full turns added to the end heading of paths between discs.

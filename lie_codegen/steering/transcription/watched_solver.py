@@ -21,11 +21,9 @@ from threading import Lock
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.runtime.child import child_environment
-
-Array = NDArray[Any]
 
 #: Seconds for one program, and more for each variable. A solve takes a tenth of it where it takes long.
 _PATIENCE, _EACH = 4.0, 1 / 400
