@@ -29,6 +29,7 @@ from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect, largest
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_guard import off_group_square
+from lie_codegen.groups.maps.log_lattice import lattice_log
 from lie_codegen.groups.maps.log_iterations import matrix_log, rotation_log, unitary_log
 from lie_codegen.groups.maps.log_structure import LogBlock
 from lie_codegen.groups.maps.logarithm import candidate
@@ -223,11 +224,16 @@ class _Twin:
         if not np.all(np.isfinite(flat)):
             return nothing
         with np.errstate(all="ignore"):
-            for start in (self._candidate,):
-                x = start(X)
-                if x is not None and self._certified(x, X):
-                    return x
-        return nothing
+            x = self._candidate(X)
+            if x is not None and self._certified(x, X):
+                return x
+            if self.data.log_structure.is_onto:
+                return nothing
+            try:
+                found = lattice_log(self.data.group, X, lambda x: self._certified(x, X))
+            except (ValueError, np.linalg.LinAlgError):
+                found = None
+        return nothing if found is None else found
 
     def _candidate(self, X: NDArray[Any]) -> Array | None:
         try:

@@ -77,6 +77,20 @@ class LogStructure:
         return not self.iterated and (not self.rows or int(domain_matrix(self.rows).rank()) == len(self.rows))
 
     @cached_property
+    def is_onto(self) -> bool:
+        """Whether the blocks' logarithms find one of every element that has one: all of SU(k), U(k), SO(k), or closed, and independent."""
+        if self.is_closed:
+            return True
+        full = 0
+        for block in self.blocks:
+            k = len(block.indices)
+            if block.kind == "matrix":
+                return False
+            sizes = {"unitary": k * k - block.special, "rotation": k * (k - 1) // 2}
+            full += sizes.get(block.kind, len(block.rows))
+        return int(domain_matrix(self.rows).rank()) == full
+
+    @cached_property
     def order(self) -> tuple[int, ...]:
         """Basis elements, those with block-diagonal matrices first."""
         blocks = diagonal_blocks(self.group.exact_basis)
