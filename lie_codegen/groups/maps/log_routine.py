@@ -33,12 +33,13 @@ from lie_codegen.groups.maps.log_lattice import lattice_log
 from lie_codegen.groups.maps.log_iterations import matrix_log, rotation_log, unitary_log
 from lie_codegen.groups.maps.log_structure import LogBlock
 from lie_codegen.groups.maps.logarithm import candidate
+from lie_codegen.groups.maps.rkmk import hat_body
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector, matmul, matvec, total
+from lie_codegen.kernel.linear import Matrix, Vector, identity, matmul, matvec, total
 from lie_codegen.kernel.routine import Routine, call_routine
 
 #: The defect up to which a closed form is taken as it is: rounding.
@@ -99,6 +100,9 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
 
     first = Kernel("log_candidate", group.name, (X, *logs), (x,), from_blocks)
     second = Kernel("log_error", group.name, (x, X), (u, Port("error", (2,))), error)
+    helpers = [first, second]
+    if not structure.is_onto:
+        helpers += _lattice_helpers(data, X, x)
     blocks, start = [], 0
     for block in structure.iterated:
         blocks.append({"kind": block.kind, "indices": block.indices, "special": block.special, "start": start})
@@ -115,6 +119,8 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         ("constants", tuple((i, j, k, float(c)) for i, j, k, c in group.algebra.constants())),
         ("candidate_symbol", first.symbol),
         ("error_symbol", second.symbol),
+        ("lattice", not structure.is_onto),
+        *((f"{each.name.removeprefix('log_')}_symbol", each.symbol) for each in helpers[2:]),
     )
     twin = _Twin(data, first, second, distance)
     return Routine(
@@ -123,10 +129,39 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         n,
         "log_routine.c.jinja",
         settings,
-        (first, second),
+        tuple(helpers),
         twin,
         _tangent(data),
     )
+
+
+def _lattice_helpers(data: GroupDerivation, X: Port, x: Port) -> list[Kernel]:
+    """hat, vee, Ad and X exp(-hat y), as the lattice's C calls them."""
+    group, n = data.group, data.group.dim
+
+    def hat(ops: Arithmetic, x: Any) -> tuple[Any, ...]:
+        return (hat_body(group, ops, x),)
+
+    def coordinates(ops: Arithmetic, A: Any) -> tuple[Any, ...]:
+        return (vee(ops, data, A),)
+
+    def adjoint(ops: Arithmetic, X: Any) -> tuple[Any, ...]:
+        matrices = GroupMatrices(ops, data.real)
+        element = matrices.read(X)
+        inverse = matrices.inverse(element)
+        columns = [matrices.Ad(element, inverse, unit) for unit in identity(n)]
+        return ([list(row) for row in zip(*columns, strict=True)],)
+
+    def turned(ops: Arithmetic, y: Any, X: Any) -> tuple[Any, ...]:
+        return (matmul(X, exp_matrix(ops, data, [product(-1, c) for c in y])),)
+
+    A, Y = matrix_port(group, "A"), matrix_port(group, "Y")
+    return [
+        Kernel("log_hat", group.name, (x,), (A,), hat),
+        Kernel("log_vee", group.name, (A,), (x,), coordinates),
+        Kernel("log_adjoint", group.name, (X,), (Port("Ad_X", (n, n)),), adjoint),
+        Kernel("log_turned", group.name, (Port("y", (n,)), X), (Y,), turned),
+    ]
 
 
 class _Frozen(tuple[Any, ...]):
