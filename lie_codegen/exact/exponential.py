@@ -16,6 +16,7 @@ from typing import Any
 
 import sympy as sp
 
+from lie_codegen.exact.newton_form import NewtonForm, newton_form
 from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
 
 _TAYLOR_TERMS = 24
@@ -50,12 +51,14 @@ class MatrixExponential:
         modes: the functions phi_j.
         entries: (i, j) -> {mode position: coefficient}, exact, no zeros.
         taylor: (i, j) -> the first Taylor coefficients of that entry in x.
+        newton: the same by divided differences, where eigenvalues are close; None where the modes lose nothing.
     """
 
     size: int
     modes: tuple[Mode, ...]
     entries: dict[tuple[int, int], dict[int, Number]]
     taylor: dict[tuple[int, int], tuple[Number, ...]]
+    newton: NewtonForm | None = None
 
     @cached_property
     def radius(self) -> float:
@@ -71,7 +74,8 @@ class MatrixExponential:
         taylor = {
             place: tuple((-1) ** order * value for order, value in enumerate(row)) for place, row in self.taylor.items()
         }
-        return MatrixExponential(self.size, modes, entries, taylor)
+        newton = None if self.newton is None else self.newton.reflected
+        return MatrixExponential(self.size, modes, entries, taylor, newton)
 
 
 def matrix_exponential(matrix: sp.MatrixBase) -> MatrixExponential:
@@ -95,7 +99,19 @@ def matrix_exponential(matrix: sp.MatrixBase) -> MatrixExponential:
                 if value != 0:
                     row[m] = value
             entries[i, j] = row
-    return MatrixExponential(size, modes, entries, _taylor(powers, coefficients, entries))
+    newton = newton_form(matrix, _roots_of(modes))
+    return MatrixExponential(size, modes, entries, _taylor(powers, coefficients, entries), newton)
+
+
+def _roots_of(modes: tuple[Mode, ...]) -> list[Number]:
+    """The roots of the minimal polynomial, as often as they occur in it."""
+    roots = []
+    for mode in modes:
+        if mode.frequency == 0:
+            roots.append(mode.rate)
+        elif not mode.odd:
+            roots += [mode.rate + sp.I * mode.frequency, mode.rate - sp.I * mode.frequency]
+    return roots
 
 
 def _powers_to_dependence(matrix: sp.MatrixBase) -> list[sp.Matrix]:

@@ -16,6 +16,7 @@ The derivative is D log(X)[X hat v] = rjac_inv(x) v on every branch: not that of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -29,12 +30,12 @@ from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect, largest
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_guard import off_group_square
-from lie_codegen.groups.maps.log_lattice import lattice_log
 from lie_codegen.groups.maps.log_iterations import matrix_log, rotation_log, unitary_log
+from lie_codegen.groups.maps.log_lattice import lattice_log
 from lie_codegen.groups.maps.log_structure import LogBlock
 from lie_codegen.groups.maps.logarithm import candidate
-from lie_codegen.groups.maps.rkmk import hat_body
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
+from lie_codegen.groups.maps.rkmk import hat_body
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
@@ -55,7 +56,7 @@ def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence
     flat = [part for row in entries for entry in row for part in _parts(entry, data.group.is_complex)]
     if not data.log_structure.is_closed:
         return call_routine(ops, log_routine(data), flat)
-    x = candidate(ops, data, entries)
+    x = _whole(ops, data, candidate(ops, data, entries))
     # Not `less(rounding, defect)`, which is false for NaN.
     square = off_group_square(ops, data, entries)
     if square is None:
@@ -65,6 +66,16 @@ def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence
     off_group = ops.less(ops.where(on_group, ops.constant(1), 0), ops.constant(0.5))
     checked = call_routine(ops, log_routine(data), flat, off_group)
     return [ops.where(on_group, closed, value) for closed, value in zip(x, checked, strict=True)]
+
+
+def _whole(ops: Arithmetic, data: GroupDerivation, x: Vector) -> Vector:
+    """x, NaN in all of its components where one block has no logarithm."""
+    partial = {"scale", "real2", "complex2"} | {block.kind for block in data.log_structure.blocks if block.scaled}
+    if not any(block.kind in partial for block in data.log_structure.blocks):
+        return x
+    size = total(ops.fabs(c) for c in x if not is_zero(c))
+    finite = ops.less(size, ops.constant(math.inf))
+    return [ops.where(finite, c, ops.constant(math.nan)) for c in x]
 
 
 def far_log(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector:

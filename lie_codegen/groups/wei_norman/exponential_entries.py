@@ -9,6 +9,7 @@ from typing import Any
 
 from lie_codegen.exact.exponential import MatrixExponential, Mode
 from lie_codegen.exact.numbers import Number
+from lie_codegen.groups.wei_norman.divided_differences import DividedDifferences
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 
 #: |x| * (largest eigenvalue) below which an entry that cancels is summed as its Taylor series.
@@ -34,6 +35,7 @@ class ExponentialEntries:
         self.printed = printed
         self._modes: dict[int, Scalar] = {}
         self._cache: dict[tuple[Any, ...], Scalar] = {}
+        self._differences: DividedDifferences | None = None
 
     def sparse(self) -> dict[tuple[int, int], Scalar]:
         """(i, j) -> entry, the structural zeros left out."""
@@ -41,6 +43,11 @@ class ExponentialEntries:
 
     def entry(self, position: tuple[int, int]) -> Scalar:
         """One entry; equal functions (up to sign) are computed once."""
+        newton = self.data.newton
+        if newton is not None and not self.printed:
+            if self._differences is None:
+                self._differences = DividedDifferences(self.ops, self.x, newton.nodes)
+            return self._differences.combined(newton.entries[position])
         terms = self.data.entries[position]
         key = tuple(sorted(terms.items(), key=lambda item: item[0]))
         if key in self._cache:
