@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 from lie_codegen.errors import IdentifierError
 
@@ -20,6 +22,16 @@ KEYWORDS = frozenset(
     typeid typename typeof typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq
     """.split()
 )
+
+
+def unknown_keywords(where: str, unknown: Iterable[str], known: Iterable[str]) -> str:
+    """What to say of keywords that a function does not have: the nearest that it has, or all."""
+    names = sorted(known)
+    said = []
+    for word in unknown:
+        near = get_close_matches(word, names, n=2, cutoff=0.6)
+        said.append(f"no option {word}" + (f"; did you mean {' or '.join(near)}?" if near else ""))
+    return f"{where}: {', '.join(said)} It has {', '.join(names)}" if said else ""
 
 
 def check_identifier(name: object, what: str) -> str:

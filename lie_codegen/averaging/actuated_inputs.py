@@ -11,7 +11,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas
 from lie_codegen.averaging.averaged import average
 from lie_codegen.errors import AssumptionError, InputError, ShapeError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
 from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
@@ -52,7 +52,7 @@ class OscillatorAverage:
         return total if order == 1 else total + eps**4 * _doubles(self.second)
 
 
-def oscillator_average(group: MatrixGroup, oscillator: PointMassOscillator, x_dot: PeriodicInput) -> OscillatorAverage:
+def oscillator_average(group: GroupLike, oscillator: PointMassOscillator, x_dot: PeriodicInput) -> OscillatorAverage:
     """Both averages of section 6.2, for the velocity x' of the point mass per unit eps, x(0) = 0.
 
     Args:
@@ -64,6 +64,7 @@ def oscillator_average(group: MatrixGroup, oscillator: PointMassOscillator, x_do
         AssumptionError: a non-zero mean: x would not be periodic.
         InputError, ShapeError: another group, a sampled input, not three components.
     """
+    group = as_group(group, "oscillator_average")
     table = {(0, 1): {2: 1}, (0, 2): {1: -1}, (1, 2): {0: 1}}
     if group.dim != 3 or {key: dict(row) for key, row in group.algebra.table.items()} != table:
         raise InputError(f"oscillator_average: {group.name} is not the group of rotations in the basis hat(e_i)")

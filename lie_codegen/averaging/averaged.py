@@ -18,7 +18,8 @@ from lie_codegen.averaging.floquet import floquet_magnus
 from lie_codegen.averaging.nilpotent import nilpotency_step
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of
@@ -178,7 +179,7 @@ class Averaged:
 
 
 def average(
-    group: MatrixGroup, u: PeriodicInput, order: int = 2, form: str = "floquet", *, X0: ArrayLike | None = None
+    group: GroupLike, u: PeriodicInput, order: int = 2, form: str = "floquet", *, X0: ArrayLike | None = None
 ) -> Averaged:
     """Average X' = eps X hat(u(t)), X(0) = X0, with error O(eps^order) on [0, b / eps].
 
@@ -194,7 +195,7 @@ def average(
         InputError: no such form or order.
         ShapeError: if u has not n components.
     """
-    require_group(group, "average")
+    group = as_group(group, "average")
     if not isinstance(u, PeriodicInput):
         raise InputError(f"average: u is {type(u).__name__}; make it a PeriodicInput")
     if u.dim != group.dim:

@@ -19,7 +19,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from lie_codegen.errors import InputError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _PANELS = 64
@@ -48,12 +48,13 @@ class Convergence:
     statement: str
 
 
-def convergence(group: MatrixGroup, u: PeriodicInput, eps: float) -> Convergence:
+def convergence(group: GroupLike, u: PeriodicInput, eps: float) -> Convergence:
     """The convergence conditions of the Magnus series of X' = eps X hat(u).
 
     Raises:
         InputError: if eps is not positive.
     """
+    group = as_group(group, "convergence")
     if not 0 < eps < np.inf:
         raise InputError(f"convergence: eps must be positive, got {eps}")
     x, w = leggauss(8)

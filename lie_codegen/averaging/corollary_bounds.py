@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.averaging.averaged import average
 from lie_codegen.flow.attitude_metrics import distances, rotation_angle
 from lie_codegen.flow.reference_flow import reference_flow
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 
@@ -51,7 +51,7 @@ class BoundCheck:
 
 
 def corollary_check(
-    group: MatrixGroup,
+    group: GroupLike,
     u: PeriodicInput,
     order: int,
     *,
@@ -64,6 +64,7 @@ def corollary_check(
         InputError: on another group.
         ChartError: if the coordinates leave |g_2| < pi / 2, where the corollaries say nothing.
     """
+    group = as_group(group, "corollary_check")
     averaged = average(group, u, order, "product")
     coordinates, angles, norms = [], [], []
     for value in eps:

@@ -21,6 +21,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.matrix import wei_norman
 from lie_codegen.kernel.expressions import expression_body
@@ -158,7 +159,7 @@ class FeedbackAverage:
 
 
 def feedback_average(
-    group: MatrixGroup, u: Sequence[Any], *, period: Any = "2*pi", parameters: Sequence[str] = ()
+    group: GroupLike, u: Sequence[Any], *, period: Any = "2*pi", parameters: Sequence[str] = ()
 ) -> FeedbackAverage:
     """Average the feedback u(t, g), n formulas in t, g1 .. gn and the parameters.
 
@@ -168,6 +169,7 @@ def feedback_average(
         InputError: a formula that is no sum of sines and cosines in t with coefficients in g.
         ShapeError: if there are not n formulas.
     """
+    group = as_group(group, "feedback_average")
     if isinstance(u, str) or len(u) != group.dim:
         raise ShapeError(f"feedback_average: give {group.dim} formulas, one for each of {', '.join(group.labels)}")
     g = sp.symbols(f"g1:{group.dim + 1}", real=True)

@@ -24,6 +24,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.averaging.floquet import bernoulli
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of
@@ -65,7 +66,7 @@ class Magnus:
         return expm(self.group.hat(self.exponent(eps, t)))
 
 
-def magnus(group: MatrixGroup, u: PeriodicInput, order: int) -> Magnus:
+def magnus(group: GroupLike, u: PeriodicInput, order: int) -> Magnus:
     """The Magnus series to a given order.
 
     It converges for t up to a limit only: see `convergence`. For times of order 1 / eps use `average`.
@@ -74,6 +75,7 @@ def magnus(group: MatrixGroup, u: PeriodicInput, order: int) -> Magnus:
         InputError: an order that is not 1 to 12, or a sampled input (its secular terms are not periodic).
         ShapeError: if u has not n components.
     """
+    group = as_group(group, "magnus")
     if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= _MOST:
         raise InputError(f"magnus: order must be an integer from 1 to {_MOST}, got {order!r}")
     if u.dim != group.dim:

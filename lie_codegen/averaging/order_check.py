@@ -14,6 +14,7 @@ from lie_codegen.averaging.chart_limit import chart_end
 from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.flow.attitude_metrics import METRICS, distances
 from lie_codegen.flow.reference_flow import ReferenceFlow, reference_flow
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.periodic_input import PeriodicInput
 
@@ -76,7 +77,7 @@ class OrderCheck:
 
 
 def order_check(
-    group: MatrixGroup,
+    group: GroupLike,
     u: PeriodicInput,
     order: int = 2,
     form: str = "floquet",
@@ -97,6 +98,7 @@ def order_check(
         InputError: bad eps, horizon or metric; AssumptionError as `average`.
         ChartError: the coordinates of the metric reach the edge of their chart.
     """
+    group = as_group(group, "order_check")
     if isinstance(eps, str) or not all(isinstance(e, int | float | np.number) for e in eps):
         raise InputError(f"order_check: eps must hold two or more different positive numbers, got {eps!r}")
     values = tuple(sorted((float(e) for e in eps), reverse=True))

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,14 @@ class VibrationLine:
             raise NotFiniteError("VibrationLine: an amplitude is NaN or infinite")
 
 
-def line_drift(group: MatrixGroup, lines: Sequence[VibrationLine]) -> Array:
+def line_drift(group: GroupLike, lines: Sequence[VibrationLine]) -> Array:
     """(n,) mean velocity caused by the lines: sum [c, s] / (2 omega). Lines of one frequency must be given as one.
 
     Raises:
         ShapeError: amplitudes that have not n components.
         InputError: a frequency given twice.
     """
+    group = as_group(group, "line_drift")
     total = np.zeros(group.dim)
     seen: set[float] = set()
     for line in lines:
@@ -67,7 +68,7 @@ def line_drift(group: MatrixGroup, lines: Sequence[VibrationLine]) -> Array:
     return total
 
 
-def spectral_drift(group: MatrixGroup, omega: ArrayLike, density: ArrayLike) -> Array:
+def spectral_drift(group: GroupLike, omega: ArrayLike, density: ArrayLike) -> Array:
     """(n,) mean velocity caused by a stationary vibration with cross-spectral density S.
 
     Args:
@@ -77,6 +78,7 @@ def spectral_drift(group: MatrixGroup, omega: ArrayLike, density: ArrayLike) -> 
     Raises:
         ShapeError, NotFiniteError, InputError: naming the argument.
     """
+    group = as_group(group, "spectral_drift")
     frequencies = np.asarray(omega, dtype=float)
     S: NDArray[Any] = np.asarray(density, dtype=complex)
     if frequencies.ndim != 1 or S.shape != (len(frequencies), group.dim, group.dim):

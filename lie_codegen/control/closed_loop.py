@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import Any, Never, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +14,10 @@ from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.reference_motion import Reference
 from lie_codegen.control.second_order_step import ForceBody, check_loop, law_states, second_order_step
 from lie_codegen.errors import ComputationError, InputError, ShapeError
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import packed_size
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.build import build_kernels
@@ -55,7 +58,7 @@ class ClosedLoop:
 
 @overload
 def closed_loop(
-    group: MatrixGroup,
+    group: GroupLike,
     *,
     inertia: Any,
     law: Kernel | None = None,
@@ -70,11 +73,25 @@ def closed_loop(
 
 
 @overload
-def closed_loop(*, mpc: Any, X0: ArrayLike | None = None, t: ArrayLike, **loop: Any) -> Any: ...
+def closed_loop(
+    *,
+    mpc: Any,
+    X0: ArrayLike | None = None,
+    t: ArrayLike,
+    values: Mapping[str, Any] | None = None,
+    plant: Any = None,
+    plant_values: Mapping[str, Any] | None = None,
+    noise: Any = None,
+    delay: int | None = None,
+    compensate: bool | None = None,
+    substeps: int | None = None,
+    seed: int | None = None,
+    runs: int | None = None,
+) -> Any: ...
 
 
 def closed_loop(
-    group: MatrixGroup | None = None,
+    group: GroupLike | None = None,
     *,
     inertia: Any = None,
     law: Kernel | None = None,
@@ -86,12 +103,21 @@ def closed_loop(
     step: float | None = None,
     tolerance: float = 1e-10,
     mpc: Any = None,
-    **loop: Any,
+    values: Mapping[str, Any] | None = None,
+    plant: Any = None,
+    plant_values: Mapping[str, Any] | None = None,
+    noise: Any = None,
+    delay: int | None = None,
+    compensate: bool | None = None,
+    substeps: int | None = None,
+    seed: int | None = None,
+    runs: int | None = None,
+    **unknown: Never,
 ) -> Any:
     """Simulates the second-order system, compiled; the law itself is the one that `generate` writes for flight.
 
     Args:
-        group: any matrix group.
+        group: any matrix group, its name or its file.
         inertia: symmetric positive definite.
         law: an attitude or tracking law, perhaps with states of its own, zero at the start: inputs behind the usual ones
             (integral) beside outputs that are their rates (integral_dot). None for an uncontrolled body.
@@ -104,21 +130,41 @@ def closed_loop(
         tolerance: on the entries of X and xi at the times t, for step None.
         mpc: a controller of `lc.mpc`, instead of group, inertia and law: its loop from t[0] to t[-1], a sample an interval;
             returns its LoopRun, or a tuple of them.
-        **loop: with `mpc` alone: values, plant, plant_values, noise, delay, compensate, substeps, seed, runs.
+        values: with `mpc` alone, as what follows: states and parameters of the problem, by name.
+        plant, plant_values: another problem (or Plant) that is really there, and its parameters; the controller's own if not given.
+        noise: standard deviation of what is measured, 0 if not given.
+        delay: samples between measurement and control, 0 if not given.
+        compensate: whether the controller looks ahead over the delay, True if not given.
+        substeps: integration steps of the plant a sample, 4 if not given.
+        seed: of the noise, 0 if not given.
+        runs: so many runs, of seeds in turn.
 
     Raises:
         InputError: an inertia that is not positive definite, a reference that jumps, a law without its reference.
         NotOnGroupError: X0 is off the group.
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
+    if unknown:
+        known = set(closed_loop.__kwdefaults__ or {}) | {"t"}
+        raise InputError(unknown_keywords("closed_loop", unknown, known))
+    loop = {
+        "values": values, "plant": plant, "plant_values": plant_values, "noise": noise, "delay": delay,
+        "compensate": compensate, "substeps": substeps, "seed": seed, "runs": runs,
+    }  # fmt: skip
+    loop = {name: value for name, value in loop.items() if value is not None}
     times = _times(t)
     if mpc is not None:
         # the controller brings its own loop: it lives on a floor above this one
         return mpc.simulate(X0, duration=float(times[-1] - times[0]), **loop)
     if loop or group is None:
-        said = f"no option {', '.join(loop)}" if loop else "no group"
+        said = f"{', '.join(loop)} without mpc=" if loop else "no group"
         raise InputError(
             f"closed_loop: {said}; without mpc= it takes a group, inertia, law, reference, external, X0, xi0, t"
+        )
+    group = as_group(group, "closed_loop")
+    if not (law is None or isinstance(law, Kernel)):
+        raise InputError(
+            f"closed_loop: law is a Kernel, as lc.tracking_law or lc.attitude_law makes it, got {law!r:.60}"
         )
     if reference is not None and reference.group != group:
         raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")

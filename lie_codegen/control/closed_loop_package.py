@@ -14,6 +14,7 @@ from lie_codegen.control.reference_motion import Reference
 from lie_codegen.control.second_order_step import check_loop, held_force_step, law_states
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.kernel import Kernel
@@ -45,7 +46,7 @@ class LoopView:
 
 
 def generate_closed_loop(
-    group: MatrixGroup,
+    group: GroupLike,
     folder: str | Path,
     *,
     inertia: Any,
@@ -69,6 +70,7 @@ def generate_closed_loop(
         InputError: as `closed_loop`; a duration or step that is not positive.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
+    group = as_group(group, "generate_closed_loop")
     from lie_codegen.codegen.package import render_package
     from lie_codegen.codegen.templates import render
     from lie_codegen.codegen.write import write_package

@@ -21,6 +21,7 @@ import sympy as sp
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import record_factory
 
@@ -36,8 +37,9 @@ _ROWS = {
 }
 
 
-def error_names(group: MatrixGroup) -> tuple[str, ...]:
+def error_names(group: GroupLike) -> tuple[str, ...]:
     """The names that `catalogue_error` knows for a group."""
+    group = as_group(group, "error_names")
     names = ["frobenius"]
     kind = _kind(group)
     if kind == "so":

@@ -16,6 +16,7 @@ import sympy as sp
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.matrix_formula import matrix_formula, scalar_formula
@@ -105,9 +106,9 @@ class ErrorFunction:
     description: str = field(default="", compare=False)
 
 
-@record_factory()
+@record_factory(group=as_group)
 def error_function(
-    group: MatrixGroup,
+    group: GroupLike,
     phi: Any,
     transport: Any = "right",
     *,
@@ -130,6 +131,7 @@ def error_function(
         InputError: unknown transport, an unknown symbol; compatibility is checked by `check_compatibility`.
         ExpressionError: a text outside the grammar, with the column.
     """
+    group = as_group(group, "error_function")
     symbols = ErrorSymbols(group)
     values = _parameters(parameters or {}, symbols)
     expression = _phi(phi, symbols, values)

@@ -20,8 +20,8 @@ from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.tracking_law import as_error, tracking_law
 from lie_codegen.errors import ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
@@ -29,9 +29,9 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, matvec, minus, number, plus, scaled
 
 
-@kernel_factory()
+@kernel_factory(group=as_group)
 def integral_law(
-    group: MatrixGroup,
+    group: GroupLike,
     *,
     inertia: Any,
     error: Any,
@@ -53,6 +53,7 @@ def integral_law(
     Raises:
         InputError: as `tracking_law`; a limit that is not positive.
     """
+    group = as_group(group, "integral_law")
     rest = {
         key: value for key, value in gains.items() if key not in ("c", "w") and key.replace("_", "").lower() != "ki"
     }

@@ -15,7 +15,7 @@ from lie_codegen.control.error_catalogue import gain
 from lie_codegen.control.tracking_law import as_error
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,13 @@ class LinearLoop:
     damping: NDArray[np.float64]
 
 
-def linear_loop(group: MatrixGroup, *, inertia: Any, error: Any, gains: Mapping[str, Any]) -> LinearLoop:
+def linear_loop(group: GroupLike, *, inertia: Any, error: Any, gains: Mapping[str, Any]) -> LinearLoop:
     """The linearisation of `tracking_law` with the same arguments; every feedforward has the same.
 
     Raises:
         InputError: as `tracking_law`.
     """
+    group = as_group(group, "linear_loop")
     n = group.dim
     metric = as_floats(positive_matrix(inertia, n, "inertia"))
     K_d = as_floats(positive_matrix(gain(gains, "K_d", "a tracking law"), n, "K_d"))
@@ -51,7 +52,7 @@ def linear_loop(group: MatrixGroup, *, inertia: Any, error: Any, gains: Mapping[
     return LinearLoop(H, values, size, -values.real / size)
 
 
-def rigid_gains(group: MatrixGroup, inertia: Any, *, bandwidth: Any, damping: Any = 0.7) -> dict[str, Any]:
+def rigid_gains(group: GroupLike, inertia: Any, *, bandwidth: Any, damping: Any = 0.7) -> dict[str, Any]:
     """K_1, K_2 and K_d for rows 1 to 3 on SE(3), or K_p and K_d on SO(3), with every mode at the wanted bandwidth.
 
     Args:
@@ -63,6 +64,7 @@ def rigid_gains(group: MatrixGroup, inertia: Any, *, bandwidth: Any, damping: An
     Raises:
         InputError: another group, a coupled inertia, a bandwidth or damping that is not positive.
     """
+    group = as_group(group, "rigid_gains")
     if (group.degree, group.dim) == (3, 3):
         found = gains_for_response(inertia, bandwidth=bandwidth, damping=damping)
         return {"K_p": found.K_p, "K_d": found.K_d}

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.control.reference_motion import TIME, FormulaReference, Reference, WaypointReference, formula_reference
 from lie_codegen.control.waypoints import waypoint_reference
 from lie_codegen.errors import InputError
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
-from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData, body_velocity, product_exp
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
@@ -149,7 +149,7 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
 
 @record_factory(times=doubles, waypoints=doubles, start=doubles)
 def reference(
-    group: MatrixGroup,
+    group: GroupLike,
     formulas: Sequence[Any] | None = None,
     *,
     times: ArrayLike | None = None,
@@ -167,6 +167,7 @@ def reference(
     Raises:
         InputError: both or neither given; else as `formula_reference` and `waypoint_reference`.
     """
+    group = as_group(group, "reference")
     if (formulas is None) == (times is None or waypoints is None):
         raise InputError(f"a reference on {group.name} is given by formulas, or by times and waypoints")
     if formulas is not None:

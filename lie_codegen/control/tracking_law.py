@@ -27,8 +27,9 @@ from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction, error_function
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
@@ -52,9 +53,9 @@ from lie_codegen.kernel.linear import (
 FEEDFORWARDS = ("basic", "right", "left", "levi_civita")
 
 
-@kernel_factory()
+@kernel_factory(group=as_group)
 def tracking_law(
-    group: MatrixGroup,
+    group: GroupLike,
     *,
     inertia: Any,
     error: Any,
@@ -78,7 +79,7 @@ def tracking_law(
         InputError: an indefinite inertia or gain, a name that is not known, a gain that is missing.
         IncompatibleError: phi and the transport map do not satisfy (A2); with the residual.
     """
-    require_group(group, "tracking_law")
+    group = as_group(group, "tracking_law")
     if feedforward not in FEEDFORWARDS:
         raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
     if gains is not None and not isinstance(gains, Mapping):

@@ -14,6 +14,7 @@ from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.tracking_law import as_error
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -39,7 +40,7 @@ class TrackingRegion:
 
 
 def tracking_region(
-    group: MatrixGroup,
+    group: GroupLike,
     *,
     inertia: Any,
     error: Any,
@@ -57,6 +58,7 @@ def tracking_region(
     Raises:
         InputError: as `tracking_law`.
     """
+    group = as_group(group, "tracking_region")
     pair = as_error(group, error, gains)
     metric = np.array(positive_matrix(inertia, group.dim, "inertia").tolist(), dtype=float)
     real, ops = RealMatrices(group), FloatArithmetic()

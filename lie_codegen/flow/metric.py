@@ -10,6 +10,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.flow.chart import mismatch, newton
 from lie_codegen.flow.libraries import integrators, logarithms
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import Admitted, admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -88,11 +89,12 @@ def _diagonal_log(group: MatrixGroup, matrix: Array) -> Array | None:
     return x if off <= _IN_ALGEBRA * max(1.0, float(np.max(np.abs(logarithm)))) else None
 
 
-def distance(group: MatrixGroup, X: ArrayLike, Y: ArrayLike) -> float:
+def distance(group: GroupLike, X: ArrayLike, Y: ArrayLike) -> float:
     """|log(X^-1 Y)|, Euclidean in the basis: left-invariant; on SO(3) the angle of the rotation from X to Y.
 
     Where X^-1 Y has no logarithm in the algebra, the Frobenius norm of X^-1 Y - I stands in.
     """
+    group = as_group(group, "distance")
     relative = np.linalg.solve(np.asarray(X), np.asarray(Y))
     x, off = matrix_log(group, relative)
     if off <= 1e-6:
@@ -111,12 +113,13 @@ def element_coordinates(group: MatrixGroup, X: ArrayLike) -> Array:
         return np.zeros(group.dim)
 
 
-def second_kind(group: MatrixGroup, X: ArrayLike) -> Array:
+def second_kind(group: GroupLike, X: ArrayLike) -> Array:
     """g with exp(g_1 A_1) ... exp(g_n A_n) = X, the one nearest to 0 that Newton's method finds.
 
     Raises:
         NotOnGroupError: if none is found from 0, from log X, or from random starts.
     """
+    group = as_group(group, "second_kind")
     target = np.asarray(X)
     rng = np.random.default_rng(_SEED)
     starts = np.vstack([np.zeros(group.dim), matrix_log(group, target)[0], rng.uniform(-2, 2, (200, group.dim))])

@@ -18,8 +18,9 @@ from lie_codegen.flow.magnus.events import run_events
 from lie_codegen.flow.magnus.run import MOST_STEPS, MagnusRun, fixed_run, magnus_run, order_for
 from lie_codegen.flow.refined import refined
 from lie_codegen.flow.trajectory import Trajectory
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted, admitted_all
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.matrix_group import MatrixGroup
 
 _FOURTH_ORDER = ("rkmk4", "commutator_free")
 METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)
@@ -27,7 +28,7 @@ _DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
 def simulate(
-    group: MatrixGroup,
+    group: GroupLike,
     u: Any,
     *,
     t: ArrayLike,
@@ -75,7 +76,7 @@ def simulate(
         NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
         ComputationError: the tolerance is not reached with the steps that can be taken: 67 million; or u(t) is not resolved.
     """
-    require_group(group, "simulate")
+    group = as_group(group, "simulate")
     times = _check_times(group, t)
     factors = _factors(group, eps)
     goal = check_tolerance(f"simulate({group.name})", rtol, atol, tolerance)

@@ -2,6 +2,7 @@
 
 from .build import build as build
 from .build import generate as generate
+from .cartan import cartan_involution as cartan_involution
 from .catalogue_load import group as group
 from .catalogue_names import group_names as group_names
 from .change_of_basis import change_of_basis as change_of_basis
@@ -15,8 +16,12 @@ from .definition import from_matrices as from_matrices
 from .kernels import group_kernels as group_kernels
 from .maps.barycentre import interpolate as interpolate
 from .maps.barycentre import mean as mean
+from .maps.commutator_free import commutator_free_step as commutator_free_step
 from .maps.covariance_kernels import covariance_kernels as covariance_kernels
 from .maps.nearest import nearest as nearest
+from .maps.quaternion import with_quaternion as with_quaternion
+from .maps.rkmk import rkmk4_step as rkmk4_step
+from .maps.rkmk import wei_norman_step as wei_norman_step
 from .maps.uncertain import Uncertain as Uncertain
 from .maps.uncertain import fuse as fuse
 from .matrix_group import MatrixGroup as MatrixGroup
@@ -27,4 +32,3 @@ from .structure import structure as structure
 from .wei_norman.chart_domain import chart_domain as chart_domain
 from .wei_norman.matrix import wei_norman as wei_norman
 from .wei_norman.order import wei_norman_order as wei_norman_order
-from .cartan import cartan_involution as cartan_involution

@@ -6,31 +6,45 @@ from functools import lru_cache
 from pathlib import Path
 
 from lie_codegen.errors import UnknownGroupError
-from lie_codegen.groups.catalogue_names import definition_source, group_path, is_generated
+from lie_codegen.groups.catalogue_names import definition_source, group_path, is_generated, plain_name
 from lie_codegen.groups.families import family
 from lie_codegen.groups.group_file import parse_group_file
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+
+#: What every function takes in the place of a group: the group, its name, or its file.
+GroupLike = MatrixGroup | str | Path
 
 
-def group(name_or_path: str | Path) -> MatrixGroup:
-    """The group of a catalogue name such as "so3", of a family such as "sl4", or of a group file (.toml).
+def group(name_or_path: GroupLike) -> MatrixGroup:
+    """The group of a catalogue name such as "so3" (or "SO(3)"), of a family such as "sl4", or of a group file (.toml).
+
+    A group is returned as it is.
 
     Raises:
         UnknownGroupError: no such name; lists those there are.
         GroupFileError, InputError: the file does not describe a group; names file, key and column.
     """
+    if isinstance(name_or_path, MatrixGroup):
+        return name_or_path
     if not isinstance(name_or_path, str | Path):
         raise UnknownGroupError(f"expected the name of a group or the path of a group file, got {name_or_path!r}")
     return group_of_source(name_or_path, definition_source(name_or_path))
 
 
-def as_group(value: MatrixGroup | str | Path) -> MatrixGroup:
+def as_group(value: GroupLike, where: str = "") -> MatrixGroup:
     """The group itself, or that of a name or a file: what every function takes in the place of a group.
 
+    Args:
+        value: the group, its name or its file.
+        where: the function that was called, for its message.
+
     Raises:
-        UnknownGroupError, GroupFileError, InputError: as `group`.
+        InputError: it is none of these.
+        UnknownGroupError, GroupFileError: as `group`.
     """
-    return value if isinstance(value, MatrixGroup) else group(value)
+    if isinstance(value, str | Path):
+        return group(value)
+    return require_group(value, where) if where else group(value)
 
 
 def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:
@@ -40,7 +54,7 @@ def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:
         GroupFileError, InputError: as `group`.
     """
     if is_generated(name_or_path):
-        return _generated(str(name_or_path))
+        return _generated(plain_name(name_or_path))
     return _parsed(source, str(group_path(name_or_path)))
 
 

@@ -33,6 +33,16 @@ def group_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
 
+def plain_name(name_or_path: str | Path) -> str:
+    """A name as the catalogue writes it: "SO3", "SO(3)" and "so(3)" are "so3", "SE_2(3)" is "se_2_3", "SO(2,2)" is "so22"; paths stay."""
+    text = str(name_or_path)
+    found = re.fullmatch(r"\s*([A-Za-z]+(?:_\d)?)\s*\(?\s*(\d*(?:\s*,\s*\d+)?)\s*\)?\s*", text, re.ASCII)
+    if isinstance(name_or_path, Path) or text in group_names() or found is None:
+        return text
+    letters, sizes = found[1].lower(), re.sub(r"\s|,", "", found[2])
+    return f"{letters}_{sizes}" if "_" in letters and sizes else letters + sizes
+
+
 def family_of(name: str) -> tuple[str, tuple[int, ...]] | None:
     """The family and the sizes a name stands for: "sl4" is ("special_linear", (4,)); None if it is no such name."""
     for kind, pattern in _FAMILIES.items():
@@ -44,7 +54,7 @@ def family_of(name: str) -> tuple[str, tuple[int, ...]] | None:
 
 def is_generated(name_or_path: str | Path) -> bool:
     """Whether the group is made from its name alone: a member of a family without a file in the catalogue."""
-    text = str(name_or_path)
+    text = plain_name(name_or_path)
     return text not in group_names() and family_of(text) is not None
 
 
@@ -54,14 +64,14 @@ def group_path(name_or_path: str | Path) -> Path:
     Raises:
         UnknownGroupError: if there is neither, with the names there are.
     """
-    text = str(name_or_path)
+    text = plain_name(name_or_path)
     if text in group_names():
         return _FOLDER / f"{text}.toml"
     path = Path(name_or_path)
     if path.suffix == ".toml":
         return path
     raise UnknownGroupError(
-        f"no group {text!r} in the catalogue ({', '.join(group_names())}) nor in its families "
+        f"no group {str(name_or_path)!r} in the catalogue ({', '.join(group_names())}) nor in its families "
         f"({', '.join(FAMILY_EXAMPLES)}, and other sizes); a file of your own ends in .toml"
     )
 
@@ -74,7 +84,7 @@ def definition_source(name_or_path: str | Path) -> bytes:
         GroupFileError: the file cannot be read.
     """
     if is_generated(name_or_path):
-        return f"family {name_or_path}".encode()
+        return f"family {plain_name(name_or_path)}".encode()
     path = group_path(name_or_path)
     try:
         return path.read_bytes()

@@ -9,12 +9,13 @@ import sympy as sp
 
 from lie_codegen.errors import InputError
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.definition import from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 
 def change_of_basis(
-    group: MatrixGroup,
+    group: GroupLike,
     combinations: Mapping[str, Mapping[str, Any]],
     *,
     name: str | None = None,
@@ -33,6 +34,7 @@ def change_of_basis(
         InputError: a label of the group is unknown, a coefficient is not an exact number, or their number is wrong.
         DependentBasisError: if the combinations are linearly dependent, naming the relation.
     """
+    group = as_group(group, "change_of_basis")
     if not isinstance(combinations, Mapping) or not all(isinstance(row, Mapping) for row in combinations.values()):
         raise InputError("change_of_basis: give {new label: {label of the group: coefficient}}")
     if len(combinations) != group.dim:

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from lie_codegen.algebra.controllability import Controllability
 from lie_codegen.algebra.controllability import controllability as algebra_controllability
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 
 
-def controllability(group: MatrixGroup, controls: Sequence[str | int]) -> Controllability:
+def controllability(group: GroupLike, controls: Sequence[str | int]) -> Controllability:
     """Whether X' = X sum u_i A_i over the given controls reaches every X, with the growth vector; exact.
 
     Raises:
         InputError: an unknown or repeated control, or none.
     """
-    require_group(group, "controllability")
+    group = as_group(group, "controllability")
     return algebra_controllability(group.algebra, controls)

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import NEAR_GROUP, ON_GROUP
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -49,22 +50,24 @@ QUATERNION_ORDERS = MappingProxyType(
 _ORDERS = {"wxyz": (0, 1, 2, 3), "xyzw": (3, 0, 1, 2)}
 
 
-def tangent_to(library: str, group: MatrixGroup, x: ArrayLike) -> Array:
+def tangent_to(library: str, group: GroupLike, x: ArrayLike) -> Array:
     """Our tangent vectors (..., n) in the order of a library's own.
 
     Raises:
         InputError: a library or group the table does not have.
         ShapeError: the last axis is not n.
     """
+    group = as_group(group, "tangent_to")
     return _vectors(group, x)[..., _permutation(library, group)]
 
 
-def tangent_from(library: str, group: MatrixGroup, x: ArrayLike) -> Array:
+def tangent_from(library: str, group: GroupLike, x: ArrayLike) -> Array:
     """A library's tangent vectors (..., n) in our order.
 
     Raises:
         InputError, ShapeError: as `tangent_to`.
     """
+    group = as_group(group, "tangent_from")
     return _vectors(group, x)[..., np.argsort(_permutation(library, group))]
 
 

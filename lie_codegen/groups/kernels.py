@@ -21,6 +21,7 @@ from functools import lru_cache
 from typing import Any
 
 from lie_codegen.errors import InputError
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.maps.exponential import ad_body, exp_matrix, jacobian
@@ -47,8 +48,9 @@ _NEWTON_SCHULZ = "Higham, Functions of Matrices (2008), (8.20); any form in plac
 _PRODUCT = "the group's own product"
 
 
-def group_kernels(group: MatrixGroup) -> tuple[Kernel, ...]:
+def group_kernels(group: GroupLike) -> tuple[Kernel, ...]:
     """All kernels of a group, in the order of `KERNEL_NAMES`."""
+    group = as_group(group, "group_kernels")
     return tuple(group_kernel(group, name) for name in KERNEL_NAMES)
 
 

@@ -11,13 +11,14 @@ import sympy as sp
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import AlgebraError, InputError, ShapeError
 from lie_codegen.exact.numbers import Number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.definition import exact_matrix
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier
 
 
-def product(a: MatrixGroup, b: MatrixGroup, *, name: str | None = None) -> MatrixGroup:
+def product(a: GroupLike, b: GroupLike, *, name: str | None = None) -> MatrixGroup:
     """The direct product: block diagonal matrices, the basis of a and then that of b.
 
     Labels stay where all are different; otherwise each gets the name of its group in front (so3_w1), and where the groups
@@ -29,8 +30,7 @@ def product(a: MatrixGroup, b: MatrixGroup, *, name: str | None = None) -> Matri
     Raises:
         IdentifierError: if the name cannot be a C identifier.
     """
-    require_group(a, "product")
-    require_group(b, "product")
+    a, b = as_group(a, "product"), as_group(b, "product")
     name = check_identifier(name if name is not None else f"{a.name}_x_{b.name}", "name")
     shift = a.dim
     table = {key: dict(row) for key, row in a.algebra.table.items()}
@@ -52,8 +52,8 @@ def joint_labels(a: MatrixGroup, b: MatrixGroup) -> tuple[str, ...]:
 
 
 def semidirect(
-    a: MatrixGroup,
-    b: MatrixGroup,
+    a: GroupLike,
+    b: GroupLike,
     action: Sequence[Any] | Mapping[str, Any] | None = None,
     *,
     name: str | None = None,
@@ -74,6 +74,7 @@ def semidirect(
         ShapeError: a matrix of the wrong size, or not one for each basis element.
         AlgebraError: if a matrix is no derivation of b, or the matrices do not follow a's brackets.
     """
+    a, b = as_group(a, "semidirect"), as_group(b, "semidirect")
     name = check_identifier(name if name is not None else f"{a.name}_on_{b.name}", "name")
     matrices = _action(a, b, action, name)
     _check_derivations(a, b, matrices, name)

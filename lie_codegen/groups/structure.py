@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from lie_codegen.algebra.structure import Structure
 from lie_codegen.algebra.structure import structure as algebra_structure
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 
 
-def structure(group: MatrixGroup) -> Structure:
+def structure(group: GroupLike) -> Structure:
     """Killing form, series, centre, radical and Levi subalgebra of the group's algebra; each computed when first read."""
-    require_group(group, "structure")
+    group = as_group(group, "structure")
     return algebra_structure(group.algebra)

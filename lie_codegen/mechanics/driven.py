@@ -14,6 +14,7 @@ from lie_codegen.errors import ComputationError
 from lie_codegen.flow.grid import Grid, refine, sample
 from lie_codegen.flow.inputs import Signal, as_signal
 from lie_codegen.flow.rollout import BLOCK
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.build import build_kernels
@@ -55,7 +56,7 @@ def _library(group: MatrixGroup) -> Library:
 
 
 def simulate_driven(
-    group: MatrixGroup,
+    group: GroupLike,
     force: Any,
     inertia: Array,
     *,
@@ -76,6 +77,7 @@ def simulate_driven(
     Raises:
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
+    group = as_group(group, "simulate_driven")
     times = np.asarray(t, dtype=float)
     signal = as_signal(group, force, times)
     start = initial_states(group, None, xi0)[0][0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import random
 from typing import Any
 
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
@@ -53,8 +54,8 @@ def driven_increments(
     return theta, change
 
 
-@kernel_factory()
-def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE, name: str = "driven_step") -> Kernel:
+@kernel_factory(group=as_group)
+def driven_step(group: GroupLike, degree: int = TAYLOR_DEGREE, name: str = "driven_step") -> Kernel:
     """(state, inertia, inverse, f0, fm, f1, h) -> (state_next,): fourth order, on the group for |h xi| <= 1/4.
 
     The state is the varying entries of X, then xi; f0, fm, f1 are the body force at t, t + h/2, t + h. Munthe-Kaas,
@@ -65,6 +66,7 @@ def driven_step(group: MatrixGroup, degree: int = TAYLOR_DEGREE, name: str = "dr
         degree: of the Taylor polynomial of the exponential.
         name: C identifier.
     """
+    group = as_group(group, "driven_step")
     n, size = group.dim, packed_size(group)
 
     def body(

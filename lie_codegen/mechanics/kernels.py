@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.exact.positive_matrix import positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -28,13 +29,14 @@ def acceleration_body(
     return matvec(constant_matrix(ops, inertia.inv()), plus(ad_star(ops, group.algebra, xi, momentum), force))
 
 
-@kernel_factory()
-def euler_poincare_kernel(group: MatrixGroup, inertia: Any, name: str = "acceleration") -> Kernel:
+@kernel_factory(group=as_group)
+def euler_poincare_kernel(group: GroupLike, inertia: Any, name: str = "acceleration") -> Kernel:
     """(xi, force) -> (xi_dot, energy): I xi' = ad*_xi I xi + f and <I xi, xi>/2.
 
     Raises:
         InputError: the inertia is not symmetric positive definite.
     """
+    group = as_group(group, "euler_poincare_kernel")
     metric = positive_matrix(inertia, group.dim, "inertia")
 
     def body(ops: Arithmetic, xi: Vector, force: Vector) -> tuple[Any, ...]:
@@ -55,13 +57,14 @@ def euler_poincare_kernel(group: MatrixGroup, inertia: Any, name: str = "acceler
     )
 
 
-@kernel_factory()
-def spatial_momentum_kernel(group: MatrixGroup, inertia: Any, name: str = "spatial_momentum") -> Kernel:
+@kernel_factory(group=as_group)
+def spatial_momentum_kernel(group: GroupLike, inertia: Any, name: str = "spatial_momentum") -> Kernel:
     """(X, xi) -> Ad*_{X^-1} I xi, which a free body keeps.
 
     Raises:
         InputError: the inertia is not symmetric positive definite.
     """
+    group = as_group(group, "spatial_momentum_kernel")
     metric = positive_matrix(inertia, group.dim, "inertia")
     real, data = RealMatrices(group), WeiNormanData(group)
 

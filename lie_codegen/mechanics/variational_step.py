@@ -19,9 +19,9 @@ import sympy as sp
 
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
-from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -50,9 +50,9 @@ _NEWTON = 3
 PotentialForce = Callable[[Arithmetic, Any], Vector]
 
 
-@kernel_factory()
+@kernel_factory(group=as_group)
 def variational_step(
-    group: MatrixGroup, inertia: Any, force: PotentialForce | None = None, name: str = "variational_step"
+    group: GroupLike, inertia: Any, force: PotentialForce | None = None, name: str = "variational_step"
 ) -> Kernel:
     """The step (state, h) -> (state_next, energy); the state is the varying entries of X, then the body momentum mu.
 
@@ -65,6 +65,7 @@ def variational_step(
     Raises:
         InputError: the inertia is not positive definite, or the Cayley map leaves the group.
     """
+    group = as_group(group, "variational_step")
     metric = positive_matrix(inertia, group.dim, "inertia")
     real = RealMatrices(group)
     check_cayley(real)

@@ -2,4 +2,14 @@
 
 from .elliptic_kernels import elliptic_kernels as elliptic_kernels
 from .euler_average import euler_average as euler_average
+from .euler_equilibria import limit_cycle_gains as limit_cycle_gains
+from .euler_equilibria import limit_cycles as limit_cycles
+from .euler_equilibria import momentum_directions as momentum_directions
+from .euler_equilibria import slow_equilibria as slow_equilibria
+from .euler_solutions import explicit_inertia_change as explicit_inertia_change
+from .euler_solutions import solve_actual as solve_actual
+from .euler_solutions import solve_averaged as solve_averaged
+from .euler_variational import euler_perturbation as euler_perturbation
+from .euler_variational import moving_parts as moving_parts
 from .free_rigid_body import free_rigid_body as free_rigid_body
+from .principal_body import principal_body as principal_body

@@ -9,4 +9,7 @@ from .goals import Position as Position
 from .goals import UpToPhase as UpToPhase
 from .ocp.front import ocp as ocp
 from .ocp.mpc import mpc as mpc
+from .plan import Plan as Plan
+from .plan import Status as Status
 from .qutip_export import qutip_evolution as qutip_evolution
+from .shooting.shooter import shooter as shooter

@@ -77,6 +77,8 @@ def check_obstacles(group: MatrixGroup, obstacles: Sequence[Obstacle]) -> tuple[
     Raises:
         SteeringInputError: a cone where X does not begin with a rotation of space, a ball where there is no position.
     """
+    if isinstance(obstacles, Cone | Ball) or not isinstance(obstacles, Sequence):
+        raise SteeringInputError(f"obstacles is a list of Cones and Balls: write obstacles=[{obstacles!r:.80}]")
     flat = all(matrix[-1, j] == 0 for matrix in group.exact_basis for j in range(group.degree))
     for obstacle in obstacles:
         if isinstance(obstacle, Cone):

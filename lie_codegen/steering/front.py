@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Never
+
+from numpy.typing import ArrayLike
 
 from lie_codegen.errors import SteeringInputError
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.identifiers import unknown_keywords
+from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.front import asks_direct, direct_plan
 from lie_codegen.steering.feedback import feedback
 from lie_codegen.steering.goals import GoalSet
@@ -18,19 +23,68 @@ from lie_codegen.steering.task import make_task
 
 
 def steer(
-    group: MatrixGroup,
+    group: GroupLike,
     target: Any,
     controls: Sequence[Any],
     duration: float,
     method: str = "auto",
     *,
     tolerance: float = 1e-6,
-    **options: Any,
+    start: ArrayLike | None = None,
+    drift: Any = None,
+    bounds: Any = None,
+    rate_bounds: Any = None,
+    velocity_bounds: Any = None,
+    weights: ArrayLike | None = None,
+    objective: str | None = None,
+    longest: float | None = None,
+    obstacles: Sequence[Obstacle] | None = None,
+    classes: int | None = None,
+    via: Sequence[tuple[float, ArrayLike]] | None = None,
+    rest: bool | None = None,
+    periodic: bool | None = None,
+    dynamics: str | None = None,
+    inertia: Any = None,
+    start_velocity: ArrayLike | None = None,
+    end_velocity: ArrayLike | None = None,
+    intervals: int | None = None,
+    pieces: int | None = None,
+    starts: int | None = None,
+    rounds: int | None = None,
+    iterations: int | None = None,
+    seed: int | None = None,
+    guess: Any = None,
+    polish: bool | None = None,
+    equation: str | None = None,
+    spread: Sequence[Any] | None = None,
+    vertices: ArrayLike | None = None,
+    solver: str | None = None,
+    cost: Any = None,
+    terminal_cost: Any = None,
+    constraints: Any = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    quadrature: str | None = None,
+    integrator: str | None = None,
+    form: str | None = None,
+    q: int | None = None,
+    amplitude: str | None = None,
+    harmonics: int | None = None,
+    order: int | None = None,
+    exact: bool | None = None,
+    threads: int | None = None,
+    steps: int | None = None,
+    planner: str | None = None,
+    gain: ArrayLike | None = None,
+    disturbance: ArrayLike | None = None,
+    noise: float | None = None,
+    step_options: dict[str, Any] | None = None,
+    progress: Callable[[str], None] | None = None,
+    **unknown: Never,
 ) -> Plan:
     """Controls that take X' = X sum_i u_i A_i from the identity to the target.
 
     Args:
-        group: the group.
+        group: the group, its name or its file.
         target: (d, d) group element, (n,) coordinates of the second kind, or a set of goals: `Pointing`, `Position`, `Coset`,
             `UpToPhase`.
         controls: labels (or positions) of the actuated basis elements; for "direct" also vectors (n,), n formulas of t, functions.
@@ -48,7 +102,57 @@ def steer(
             "transcription": bounds, rates, obstacles, drift, torques, via points, periodic controls, minimum time;
             "feedback": in steps, each planned from the measured state.
         tolerance: endpoint error |log(target^-1 X)| below which the plan counts as solved.
-        **options: of the method; see its function.
+        start: (d, d) X(0), an element or coordinates; the identity if not given.
+        drift: (n,) constant velocity beside the controls' own [units of u]; for "direct" also formulas of t or a function.
+        bounds: of the controls [units of u]: a number b for -b <= u <= b, a pair (low, high), or {label: either}; none.
+        rate_bounds: of their time derivatives [units of u / s], as bounds; none (transcription).
+        velocity_bounds: of any component of xi, as bounds, second order; none (transcription).
+        weights: (m,) positive weights w_i of the cost sum w_i u_i^2; ones.
+        objective: "energy" (default), "time" or "fuel" (transcription: not fuel).
+        longest: longest duration allowed for "time", in units of `duration`; 20.
+        obstacles: `Cone`s and `Ball`s to keep out of, on all of the way; none (transcription).
+        classes: homotopy classes of ways between discs that are tried; 4 (transcription).
+        via: (fraction of the duration, element or coordinates) to pass through; none (transcription).
+        rest: controls are zero at both ends; False (transcription).
+        periodic: controls end as they begin: a gait; False (transcription).
+        dynamics: "first_order" (default): u is a velocity; "second_order": u is a torque [N m] or force [N] (transcription).
+        inertia: of the second order: a number, (n,) or (n, n), positive definite [kg m^2, kg].
+        start_velocity: (n,) xi at the start, second order; zero.
+        end_velocity: (n,) xi at the end, second order; zero.
+        intervals: pieces of the controls; 64 (transcription), 60 (ocp).
+        pieces: constant pieces of the first search; by the task (direct).
+        starts: first guesses tried; 16 (direct), 8 (ocp, circle, area_rule), 3 (transcription), tuned (optimal).
+        rounds: rounds of starts before giving up; 4 (direct).
+        iterations: iterations of a descent; 150 (direct).
+        seed: of the random starts or the noise; 0 (direct, ocp, feedback).
+        guess: controls to start from beside the others: a Plan, (k, m) samples at equal times, a function of t; none.
+        polish: continuous controls after the constant pieces; True (direct).
+        equation: "left" (default), X' = X hat(u), or "right", X' = hat(u) X (direct).
+        spread: systems {"drift": ..., "gain": ...} that the controls shall serve alike; none (direct).
+        vertices: control vectors that arcs of least time take; the corners of the bounds (direct).
+        solver: "auto" (default), "fatrop" or "ipopt" (transcription).
+        cost: running cost l of `lc.ocp`; norm2(u) (ocp).
+        terminal_cost: phi of `lc.ocp`; none (ocp).
+        constraints: g <= 0 of `lc.ocp`; none (ocp).
+        parameters: {name: value} of the formulas; none (ocp).
+        quadrature: "trapezoid" (default), "left" or "simpson" (ocp).
+        integrator: "rkmk4" (default) or "midpoint" (ocp).
+        form: "product" (default), (60), or "single", (66) (four_phase).
+        q: periods of the second phase; by the task (four_phase).
+        amplitude: "auto" (default), "free" or as the paper's (four_phase).
+        harmonics: harmonics of the controls; 2 (area_rule).
+        order: order of averaging; 2 (area_rule).
+        exact: retuned to hit the target; True (circle, loops, area_rule).
+        threads: processor threads; 1 (optimal).
+        steps: steps, each planned from the measured state; 8 (feedback).
+        planner: method of each step; "area_rule" (feedback).
+        gain: of the corrections; 1 (feedback).
+        disturbance: (n,) constant velocity that the plans do not know; none (feedback).
+        noise: standard deviation of the measured state; 0 (feedback).
+        step_options: options of the planner; none (feedback).
+        progress: called with a line a stage; a line on stderr after a second, in a terminal or a notebook.
+
+    An option that is None is the default of the method; one that the method does not have is refused, with those it has.
 
     Raises:
         UncontrollableError: with the growth vector and the missing directions.
@@ -57,6 +161,65 @@ def steer(
         InfeasibleError: no controls within the bounds reach the target: proved, see `.certificate`.
         SteeringError: the solver found nothing admissible; says what was tried, `.best` and `.violation`.
     """
+    group = as_group(group, "steer")
+    if unknown:
+        known = set(steer.__kwdefaults__ or {})
+        raise SteeringInputError(unknown_keywords(f"steer({group.name})", unknown, known))
+    options = {
+        name: value
+        for name, value in {
+            "start": start,
+            "drift": drift,
+            "bounds": bounds,
+            "rate_bounds": rate_bounds,
+            "velocity_bounds": velocity_bounds,
+            "weights": weights,
+            "objective": objective,
+            "longest": longest,
+            "obstacles": obstacles,
+            "classes": classes,
+            "via": via,
+            "rest": rest,
+            "periodic": periodic,
+            "dynamics": dynamics,
+            "inertia": inertia,
+            "start_velocity": start_velocity,
+            "end_velocity": end_velocity,
+            "intervals": intervals,
+            "pieces": pieces,
+            "starts": starts,
+            "rounds": rounds,
+            "iterations": iterations,
+            "seed": seed,
+            "guess": guess,
+            "polish": polish,
+            "equation": equation,
+            "spread": spread,
+            "vertices": vertices,
+            "solver": solver,
+            "cost": cost,
+            "terminal_cost": terminal_cost,
+            "constraints": constraints,
+            "parameters": parameters,
+            "quadrature": quadrature,
+            "integrator": integrator,
+            "form": form,
+            "q": q,
+            "amplitude": amplitude,
+            "harmonics": harmonics,
+            "order": order,
+            "exact": exact,
+            "threads": threads,
+            "steps": steps,
+            "planner": planner,
+            "gain": gain,
+            "disturbance": disturbance,
+            "noise": noise,
+            "step_options": step_options,
+            "progress": progress,
+        }.items()
+        if value is not None
+    }
     if asks_open(method, options):
         return open_plan(group, target, controls, duration, tolerance, **options)
     if isinstance(target, GoalSet) and method not in ("auto", "direct", "ocp"):

@@ -15,6 +15,7 @@ from lie_codegen.control.error_function import ErrorSymbols, error_function
 from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import eigenvalues, symmetric_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -56,12 +57,13 @@ class Potential:
         return ErrorDerivatives(ops, self.data, self.real, element, identity(self.real.size))
 
 
-def damping_force(group: MatrixGroup, D: Any) -> ForceBody:
+def damping_force(group: GroupLike, D: Any) -> ForceBody:
     """-D xi, D symmetric and not negative.
 
     Raises:
         InputError: D has a negative eigenvalue.
     """
+    group = as_group(group, "damping_force")
     matrix = symmetric_matrix(D, group.dim, "damping")
     if eigenvalues(matrix)[0] < -1e-12:
         raise InputError("damping has a negative eigenvalue: it would drive the system")

@@ -22,6 +22,7 @@ import sympy as sp
 from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import eigenvalues, positive_matrix, real_number, symmetric_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, record_factory
@@ -57,9 +58,9 @@ class UnderwaterVehicle:
     current: tuple[sp.Expr, ...]
 
 
-@record_factory()
+@record_factory(group=as_group)
 def underwater_vehicle(
-    group: MatrixGroup,
+    group: GroupLike,
     *,
     inertia: Any,
     added: Any = 0,
@@ -76,6 +77,7 @@ def underwater_vehicle(
     Raises:
         InputError: the group is not SE(3) in the order w, v; the total inertia is indefinite; a damping is negative.
     """
+    group = as_group(group, "underwater_vehicle")
     if group.labels != _RIGID or group.degree != 4:
         raise InputError(f"an underwater vehicle moves on se3 with labels {', '.join(_RIGID)}; reorder {group.name}")
     extra = symmetric_matrix(added, 6, "added")

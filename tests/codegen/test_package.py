@@ -19,7 +19,7 @@ from lie_codegen.codegen.package import render_library, render_package
 from lie_codegen.codegen.templates import environment, template_folder
 from lie_codegen.codegen.views import PackageMetadata, comment_lines
 from lie_codegen.codegen.write import write_package
-from lie_codegen.errors import CodegenError, IdentifierError, OutputFolderError
+from lie_codegen.errors import CodegenError, OutputFolderError
 from lie_codegen.kernel.kernel import Kernel, Port
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.short_exponential import short_pattern, times_short_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp, rate
@@ -114,13 +115,15 @@ def sum_products(pairs: Any) -> Any:
     return 0 if total is None else total
 
 
-@kernel_factory()
-def rkmk4_step(group: MatrixGroup, name: str = "rkmk4_step") -> Kernel:
+@kernel_factory(group=as_group)
+def rkmk4_step(group: GroupLike, name: str = "rkmk4_step") -> Kernel:
     """One step of X' = X hat(u): (X, u0, um, u1, h) -> X_next, for `scan`.
 
     u0, um, u1 are u at t, t + h/2, t + h; exact on the group, global error O(h^4); |h u| <= 1/4 keeps the
     exponential exact to rounding.
     """
+
+    group = as_group(group, "rkmk4_step")
 
     def body(ops: Arithmetic, X: Any, u0: Any, um: Any, u1: Any, h: Any) -> tuple[Any, ...]:
         return (times_taylor_exp(group, ops, X, rkmk4_increment(group, ops, u0, um, u1, h)),)
@@ -154,9 +157,10 @@ def flow_step(group: MatrixGroup, name: str, body: Body, formula: str, source: s
     )
 
 
-@kernel_factory()
-def wei_norman_step(group: MatrixGroup, name: str = "wei_norman_step") -> Kernel:
+@kernel_factory(group=as_group)
+def wei_norman_step(group: GroupLike, name: str = "wei_norman_step") -> Kernel:
     """One classical RK4 step of g' = M(g) u: (g, u0, um, u1, h) -> g_next, for `scan`."""
+    group = as_group(group, "wei_norman_step")
     n = group.dim
     data = WeiNormanData(group)
 

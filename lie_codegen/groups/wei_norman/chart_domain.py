@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.algebra.adjoint import ad
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.chart_end import End, chart_end, escaping_input
 from lie_codegen.groups.wei_norman.matrix import WeiNorman, wei_norman
@@ -51,8 +52,9 @@ class ChartDomain:
         return self.end == "never"
 
 
-def chart_domain(group: MatrixGroup) -> ChartDomain:
+def chart_domain(group: GroupLike) -> ChartDomain:
     """The domain of the Wei-Norman chart of a group in its basis order."""
+    group = as_group(group, "chart_domain")
     if is_generic(group.algebra):
         return _numeric_domain(group)
     wn = wei_norman(group)

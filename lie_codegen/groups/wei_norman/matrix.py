@@ -15,7 +15,8 @@ from typing import cast
 import sympy as sp
 
 from lie_codegen.algebra.adjoint import ad
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData, inverse_columns
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
 from lie_codegen.groups.wei_norman.frames import times_vector
@@ -136,12 +137,12 @@ class WeiNorman:
         }
 
 
-def wei_norman(group: MatrixGroup) -> WeiNorman:
+def wei_norman(group: GroupLike) -> WeiNorman:
     """The exact Wei-Norman equations of a group in its basis order.
 
     M_inverse, determinant and M follow when they are read. The determinant is factored; that it never vanishes does not
     make the coordinates global: see `wei_norman_order`.
     """
-    require_group(group, "wei_norman")
+    group = as_group(group, "wei_norman")
     symbols = tuple(sp.Symbol(f"g{k}") for k in range(1, group.dim + 1))
     return WeiNorman(group, symbols, WeiNormanData(group))

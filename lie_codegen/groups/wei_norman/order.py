@@ -13,6 +13,7 @@ from lie_codegen.algebra.structure import structure
 from lie_codegen.algebra.subspace import Subspace, Vector
 from lie_codegen.exact.numbers import Number
 from lie_codegen.groups.cartan import restricted_to
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -62,7 +63,7 @@ class WeiNormanOrder:
         return self.domain.is_global
 
 
-def wei_norman_order(group: MatrixGroup) -> WeiNormanOrder:
+def wei_norman_order(group: GroupLike) -> WeiNormanOrder:
     """The basis order with the largest Wei-Norman chart, and why.
 
     A solvable algebra gets an order along a chain of ideals, which is global. Otherwise the semisimple part comes first and
@@ -70,6 +71,7 @@ def wei_norman_order(group: MatrixGroup) -> WeiNormanOrder:
     Where a change of basis does better (Iwasawa's K, A, N for a noncompact semisimple part, an adapted basis for a solvable
     algebra), it is offered beside. The present order wins ties.
     """
+    group = as_group(group, "wei_norman_order")
     best, domain = group, chart_domain(group)
     for order in _candidates(group):
         if domain.is_global:

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix
-from lie_codegen.groups.catalogue_load import group as load_group
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import varying_entries
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.ocp.checks import check_problem
@@ -35,7 +35,7 @@ Terms = Term | Sequence[Term]
 
 
 def ocp(
-    group: MatrixGroup | str,
+    group: GroupLike,
     *,
     duration: float | tuple[float, float],
     intervals: int,
@@ -101,7 +101,7 @@ def ocp(
         ExpressionError: a formula outside the grammar, with an unknown name, or a matrix as a cost.
         InputError, ShapeError, NotFiniteError: anything else, naming the culprit.
     """
-    group = load_group(group) if isinstance(group, str) else require_group(group, "ocp")
+    group = as_group(group, "ocp")
     where = f"ocp({group.name})"
     element: Shape = (group.degree, group.degree, 2) if group.is_complex else (group.degree, group.degree)
     given = dict(parameters or {})

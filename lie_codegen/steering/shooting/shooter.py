@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.algebra.controllability import require_controllable
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
@@ -104,8 +105,7 @@ class Shooter:
         return array.reshape(-1, d, d)
 
 
-@lru_cache(maxsize=16)
-def shooter(group: MatrixGroup, controls: tuple[int | str, ...]) -> Shooter:
+def shooter(group: GroupLike, controls: Sequence[int | str]) -> Shooter:
     """The solver of a group and its controls, compiled once and cached.
 
     Raises:
@@ -113,6 +113,11 @@ def shooter(group: MatrixGroup, controls: tuple[int | str, ...]) -> Shooter:
         InputError: an unknown or repeated control.
         CompileError: with the command and the compiler's own words.
     """
+    return _shooter(as_group(group, "shooter"), tuple(controls))
+
+
+@lru_cache(maxsize=16)
+def _shooter(group: MatrixGroup, controls: tuple[int | str, ...]) -> Shooter:
     report = require_controllable(group.algebra, controls)
 
     def files() -> dict[str, str]:
