@@ -36,11 +36,11 @@ def group_names() -> tuple[str, ...]:
 def plain_name(name_or_path: str | Path) -> str:
     """A name as the catalogue writes it: "SO3", "SO(3)" and "so(3)" are "so3", "SE_2(3)" is "se_2_3", "SO(2,2)" is "so22"; paths stay."""
     text = str(name_or_path)
-    found = re.fullmatch(r"\s*([A-Za-z]+(?:_\d)?)\s*\(?\s*(\d*(?:\s*,\s*\d+)?)\s*\)?\s*", text, re.ASCII)
+    found = re.fullmatch(r"([A-Za-z]+(?:_\d)?)(?:\((\d+(?:, ?\d+)?)\)|(\d+))", text, re.ASCII)
     if isinstance(name_or_path, Path) or text in group_names() or found is None:
         return text
-    letters, sizes = found[1].lower(), re.sub(r"\s|,", "", found[2])
-    return f"{letters}_{sizes}" if "_" in letters and sizes else letters + sizes
+    letters, sizes = found[1].lower(), re.sub(r"\D", "", found[2] or found[3])
+    return f"{letters}_{sizes}" if "_" in letters else letters + sizes
 
 
 def family_of(name: str) -> tuple[str, tuple[int, ...]] | None:

@@ -105,7 +105,7 @@ def test_members_that_a_family_does_not_have(name: str) -> None:
         lc.group(name)
 
 
-@pytest.mark.parametrize("name", ["so", "spin3", "e8", "../so3", "so3 ", "SO3", "so-3", "", "so５"])
+@pytest.mark.parametrize("name", ["so", "spin3", "e8", "../so3", "so3 ", "so-3", "", "so５"])
 def test_unknown_names_list_what_there_is(name: str) -> None:
     with pytest.raises(UnknownGroupError, match=r"so3.*so5"):
         lc.group(name)
@@ -129,3 +129,17 @@ def test_the_table_has_a_row_for_each_group() -> None:
     [row] = [line for line in lines if line.startswith("| se3 |")]
     assert row.startswith("| se3 | 6 | 4 x 4 real | Levi + radical | \\|g2\\| < pi/2 | cos(g2) | ")
     assert row.endswith(" s |")
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [("SO3", "so3"), ("SO(3)", "so3"), ("se(3)", "se3"), ("SE_2(3)", "se_2_3"), ("SO(3,1)", "so31"), ("Sp(4)", "sp4"), ("SL(4)", "sl4")],
+)  # fmt: skip
+def test_names_are_understood_as_books_write_them(written: str, name: str) -> None:
+    assert lc.group(written) == lc.group(name)
+    assert lc.build(written).namespace == lc.group(name).name
+
+
+def test_a_group_is_the_group_of_itself() -> None:
+    so3 = lc.group("so3")
+    assert lc.group(so3) is so3
