@@ -16,15 +16,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.open_quadrotor import HOVER, INTERVALS, STEP, Tasks, program, quadrotor, tasks
 from lie_codegen.errors import CompileError
 from lie_codegen.runtime.compiler import compile_library, find_compilers
 from lie_codegen.steering.ocp.mpc import mpc
 from lie_codegen.steering.plan import Status
-
-Array = NDArray[Any]
 
 _NEAR = 1e-4
 _GOOD = 1.01

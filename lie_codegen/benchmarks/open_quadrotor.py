@@ -6,14 +6,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.steering.ocp.front import ocp
 from lie_codegen.steering.ocp.problem import OptimalControlProblem
 
-Array = NDArray[Any]
 #: (tasks, 12): target and three cylinders (x, y, radius).
 Tasks = Array
 

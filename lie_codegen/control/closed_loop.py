@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Never, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.control.reference_check import check_reference
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.reference_motion import Reference
@@ -22,8 +23,6 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
-
-Array = NDArray[Any]
 
 _MOST_STEPS = 2**21
 _LARGEST_MOVE = 0.25

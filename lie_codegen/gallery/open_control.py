@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from lie_codegen.arrays import Array
 from lie_codegen.gallery.open_problems import parking, quadrotor, qubit, satellite, underwater
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
@@ -17,7 +17,6 @@ from lie_codegen.pictures.steering_loops import COLOURS, GREY
 from lie_codegen.steering.ocp.mpc import mpc
 from lie_codegen.steering.ocp.plan import OptimalPlan
 
-Array = NDArray[Any]
 Progress = Callable[[str], None]
 
 

@@ -45,10 +45,10 @@ def package_digest() -> str:
 
 @cache
 def templates_digest() -> str:
-    """Digest of the templates."""
+    """Digest of the templates, and of the plain C beside them."""
     from lie_codegen.codegen.templates import template_folder
 
-    return _tree_digest(template_folder(), ".jinja")
+    return _tree_digest(template_folder(), (".jinja", ".c", ".h"))
 
 
 @cache
@@ -70,7 +70,7 @@ def cpu_identity() -> str:
     return "\n".join([sys.platform, machine, *lines])
 
 
-def _tree_digest(folder: Path, suffix: str) -> str:
+def _tree_digest(folder: Path, suffix: str | tuple[str, ...]) -> str:
     """Of the names and contents below a folder; by os and not pathlib, which would take three times as long."""
     root = str(folder)
     paths = sorted(

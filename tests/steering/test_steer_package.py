@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import lie_codegen as lc
+from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import InputError, UncontrollableError
 from lie_codegen.steering.shooting.package import render_steering_package
 from lie_codegen.steering.shooting.shooter import shooter
@@ -71,10 +72,27 @@ def test_clang_agrees(tmp_path: Path) -> None:
 
 
 def test_nothing_is_allocated_and_nothing_is_global() -> None:
-    source = render_steering_package(lc.group("so3"), ("w1", "w2"))["src/so3_steer.c"]
+    tree = render_steering_package(lc.group("so3"), ("w1", "w2"))
+    source = tree["src/steering_problem.h"] + tree["src/so3_steer.c"]
     assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\b", source)
     outside = re.sub(r"\{[^{}]*\}", "", source)
     assert not re.findall(r"^static (?!const|void|int|double|inline)\w+ \w+( =|;)", outside, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize(("name", "controls"), [("so3", ("w1", "w2", "w3")), ("se2", ("omega", "vx")), ("su2", (0, 1))])
+def test_the_core_is_plain_c_that_tools_read_as_it_is(
+    name: str, controls: tuple[int | str, ...], tmp_path: Path
+) -> None:
+    core = template_folder() / "steering_core.c"
+    assert not re.search(r"\{[{%#]|[%#}]\}", core.read_text())
+    tree = render_steering_package(lc.group(name), controls)
+    assert tree[f"src/{name}_steer.c"] == core.read_text()
+    for path in (f"include/{name}_steer.h", "src/steering_problem.h"):
+        (tmp_path / Path(path).name).write_text(tree[path])
+    for lanes in ((), ("-DLIE_CODEGEN_ONE_LANE",)):
+        command = [str(COMPILER), *STRICT, *lanes, "-fsyntax-only", f"-I{tmp_path}", str(core)]
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
 
 
 def test_the_same_bytes_twice_and_vectors_that_the_library_agrees_with(tmp_path: Path) -> None:

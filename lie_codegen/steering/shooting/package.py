@@ -16,7 +16,7 @@ from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.shooting.lie_poisson import transport
-from lie_codegen.steering.shooting.source import SteeringView, render_steering, steering_view
+from lie_codegen.steering.shooting.source import PROBLEM, SteeringView, render_steering, steering_view
 
 _VECTORS = 8
 _STEPS, _ROWS = 8, 8
@@ -62,6 +62,7 @@ def render_steering_package(group: MatrixGroup, controls: Sequence[str | int], f
     tree = {
         f"include/{view.prefix}.h": sources[f"{view.prefix}.h"],
         f"src/{view.prefix}.c": sources[f"{view.prefix}.c"],
+        f"src/{PROBLEM}": sources[PROBLEM],
         "CMakeLists.txt": render("steering_CMakeLists.txt.jinja", **context),
         "example.c": render("steering_example.c.jinja", **context),
         "test_vectors.csv": render("steering_vectors.csv.jinja", vectors=vectors),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.codegen.opcodes import C99_FORMS, Target, c_literal
 from lie_codegen.codegen.tape import Tape, tape_of
-from lie_codegen.codegen.templates import render
+from lie_codegen.codegen.templates import render, template_folder
 from lie_codegen.codegen.views import StatementView, comment_lines, kernel_view
 from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -23,6 +23,8 @@ from lie_codegen.steering.shooting.lie_poisson import shooting_kernels
 
 #: A vector of doubles, one start a lane.
 LANES = Target("V", {op: C99_FORMS[op] for op in ("ADD", "SUB", "MUL", "DIV", "NEG", "INV", "TWICE", "SQ")}, c_literal)
+#: The header that the source includes.
+PROBLEM = "steering_problem.h"
 
 
 @dataclass(frozen=True)
@@ -125,10 +127,11 @@ def loop_areas(group: MatrixGroup, controls: Sequence[int]) -> tuple[tuple[tuple
 
 
 def render_steering(view: SteeringView) -> dict[str, str]:
-    """The header and the source of the solver: {file name: text}."""
+    """The header of the solver, what it solves, and its source, the same for every group: {file name: text}."""
     return {
         f"{view.prefix}.h": render("steering_header.h.jinja", view=view),
-        f"{view.prefix}.c": render("steering_source.c.jinja", view=view),
+        PROBLEM: render("steering_problem.h.jinja", view=view),
+        f"{view.prefix}.c": (template_folder() / "steering_core.c").read_text(encoding="utf-8"),
     }
 
 

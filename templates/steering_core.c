@@ -1,4 +1,9 @@
-{# The shooting solver: LANES starts at a time, in vectors of doubles where the compiler has them. #}
+/* SPDX-License-Identifier: MIT-0 */
+/*
+ * Minimum-energy steering by shooting on the Lie-Poisson equations: LANES starts at a time, in vectors of doubles where the
+ * compiler has them. What belongs to one group and its controls (sizes, brackets, flows, names of the functions) stands in
+ * steering_problem.h; what the functions do is said in the header that it includes.
+ */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -21,38 +26,6 @@ typedef double V;
 typedef int K;
 #endif
 
-enum {
-    N = {{ view.dim }},            /* dimension of the group */
-    M = {{ view.controls | length }},            /* controls */
-    SIZE = {{ view.size }},         /* doubles of a packed element */
-    DEPTH = {{ view.depth + 1 }},        /* length of the longest bracket that is needed */
-    SEED_STEPS = {{ view.seed_steps }}, /* a multiple of 16: the waves and circles repeat on this grid */
-    WAVE = 2 * SEED_STEPS - 1,
-    FLOW = N + SIZE, /* mu and X */
-    ROWS = 8,        /* of the extrapolation: order 16 */
-    MOST_STEPS = 64, /* extrapolated steps */
-    MOST_NODES = 128, /* Runge-Kutta steps */
-    PAIRS = {{ view.areas | length }},
-    KEPT = 8 /* candidates kept for polishing */
-};
-
-static const int control_of[M] = {{ "{" }}{{ view.controls | join(", ") }}{{ "}" }};
-/* length of the shortest brackets of controls that reach each direction */
-static const int length_of[N] = {{ "{" }}{{ view.lengths | join(", ") }}{{ "}" }};
-static const double identity[SIZE] = {{ "{" }}{{ view.identity | join(", ") }}{{ "}" }};
-{% if view.areas %}
-static const int first_of[PAIRS] = {{ "{" }}{{ view.first | join(", ") }}{{ "}" }};
-static const int second_of[PAIRS] = {{ "{" }}{{ view.second | join(", ") }}{{ "}" }};
-/* areas of the loops of each pair of controls, from the coordinates of the target (the area rule) */
-static const double area_of[PAIRS][N] = {
-{% for row in view.areas %}
-    {{ "{" }}{{ row | join(", ") }}{{ "}" }}{{ "," if not loop.last }}
-{% endfor %}
-};
-{% endif %}
-/* cos(pi k / SEED_STEPS) */
-static const double cosine[2 * SEED_STEPS] = {{ "{" }}{{ view.cosines | join(", ") }}{{ "}" }};
-
 static void fill(V *v, int count, double value)
 {
     const V zero = {0.0};
@@ -61,28 +34,17 @@ static void fill(V *v, int count, double value)
         v[i] = zero + value;
     }
 }
-{% for kernel in view.kernels %}
 
-/* {{ kernel.formula | join(" ") }} */
-static void {{ kernel.name }}(
-{%- for port in kernel.inputs %}const V *{{ port }}, {% endfor %}
-{%- for port in kernel.outputs %}V *{{ port }}{{ ", " if not loop.last }}{% endfor %})
-{
-{% for port in kernel.unused %}
-    (void){{ port }};
-{% endfor %}
-{% for statement in kernel.statements %}
-    const V {{ statement.name }} = {{ statement.expression }};
-{% endfor %}
-{% for store in kernel.stores %}
-{% if store.is_literal %}
-    fill({{ store.parameter }} + {{ store.entry }}, 1, {{ store.value }});
-{% else %}
-    {{ store.parameter }}[{{ store.entry }}] = {{ store.value }};
-{% endif %}
-{% endfor %}
-}
-{% endfor %}
+#include "steering_problem.h"
+
+enum {
+    WAVE = 2 * SEED_STEPS - 1,
+    FLOW = N + SIZE, /* mu and X */
+    ROWS = 8,        /* of the extrapolation: order 16 */
+    MOST_STEPS = 64, /* extrapolated steps */
+    MOST_NODES = 128, /* Runge-Kutta steps */
+    KEPT = 8 /* candidates kept for polishing */
+};
 
 /*
  * One step h of (mu, X), y[N + SIZE], by the modified midpoint rule with 2, 4, ... 2 ROWS substeps, extrapolated in the
@@ -619,11 +581,9 @@ static void area_rule(const problem *task, const V *x, int start, V (*u)[M])
     const double r = LANE(task->radius, 0);
     double ease[M];
     int t, i, l;
-{% if view.areas %}
-    int order[PAIRS];
-    double area[PAIRS];
+    int order[PAIRS + 1];
+    double area[PAIRS + 1];
     int a, b;
-{% endif %}
     for (i = 0; i < M; ++i) {
         ease[i] = sqrt(LANE(task->inverse_weights[i], 0));
     }
@@ -641,7 +601,7 @@ static void area_rule(const problem *task, const V *x, int start, V (*u)[M])
         for (i = 0; i < N; ++i) {
             size += LANE(x[i], l) * LANE(x[i], l);
         }
-        size = number < 8 * {{ view.quiet_rounds }} ? 0.0 : {{ view.wave_size }} * (sqrt(size) + r);
+        size = number < 8 * QUIET_ROUNDS ? 0.0 : WAVE_SIZE * (sqrt(size) + r);
         for (i = 0; i < M; ++i) {
             for (t = 0; t < 4; ++t) {
                 wave[i][t] = size * uniform(&state) * 1.7 * ease[i];
@@ -651,7 +611,6 @@ static void area_rule(const problem *task, const V *x, int start, V (*u)[M])
             phase += SEED_STEPS / 8;
             stretch = 1.0 + 0.5 * uniform(&state);
         }
-{% if view.areas %}
         for (a = 0; a < PAIRS; ++a) {
             area[a] = 0.0;
             for (i = 0; i < N; ++i) {
@@ -676,8 +635,7 @@ static void area_rule(const problem *task, const V *x, int start, V (*u)[M])
                 }
             }
         }
-{% endif %}
-        for (t = 0; number >= 8 * {{ view.quiet_rounds }} && t <= 2 * SEED_STEPS; ++t) {
+        for (t = 0; number >= 8 * QUIET_ROUNDS && t <= 2 * SEED_STEPS; ++t) {
             for (i = 0; i < M; ++i) {
                 LANE(u[t][i], l) += wave[i][0] * cosine[t & WAVE] + wave[i][1] * cosine[(t + quarter) & WAVE]
                     + wave[i][2] * cosine[(2 * t) & WAVE] + wave[i][3] * cosine[(2 * t + quarter) & WAVE];
@@ -927,8 +885,8 @@ static void begin(problem *task, V *x, candidates *list)
  * Where weights differ much, brackets of brackets are needed, or one round was not enough, the guesses are relaxed. The
  * second time, `again`, the grid is finer, and what is near a large target without an end in sight is dropped.
  */
-static void search(problem *task, const {{ view.prefix }}_options *options, int first, int last, int relaxed, int again,
-    candidates *list, {{ view.prefix }}_result *result)
+static void search(problem *task, const steering_options *options, int first, int last, int relaxed, int again,
+    candidates *list, steering_result *result)
 {
     V x[N], u[2 * SEED_STEPS + 1][M];
     rules rule;
@@ -950,11 +908,11 @@ static void search(problem *task, const {{ view.prefix }}_options *options, int 
     for (; first < last || (list->count == 0 && first < 4 * last); first += LANES) {
         area_rule(task, x, first, u);
         if (relaxed || first >= last) {
-            relax(task, {{ view.relaxations }}, u, at.p);
+            relax(task, RELAXATIONS, u, at.p);
         } else {
             nearest_costate(task, u, at.p);
         }
-        rule.scaled = {{ "(first / 8) % 2 != 0" if view.is_deep else "0" }};
+        rule.scaled = IS_DEEP && (first / 8) % 2 != 0;
         result->linearisations += descend(task, &rule, &at, done);
         for (l = 0; l < LANES && (first + l < last || first >= last); ++l) {
             const int loose = LANE(at.Z, l) > 1e-6 * size;
@@ -971,8 +929,8 @@ static void search(problem *task, const {{ view.prefix }}_options *options, int 
  * Polishes the candidates of `count` targets side by side on the exact flow: first those that may be the cheapest, and if
  * they fail the others. Targets that are solved are left alone.
  */
-static void polish(int count, const double *targets, problem *task, const {{ view.prefix }}_options *options,
-    const candidates *list, {{ view.prefix }}_result *results)
+static void polish(int count, const double *targets, problem *task, const steering_options *options,
+    const candidates *list, steering_result *results)
 {
     const int each = LANES / count;
     const double near = options->tolerance * options->tolerance;
@@ -996,7 +954,7 @@ static void polish(int count, const double *targets, problem *task, const {{ vie
             const int which = done % KEPT + l % each;
             /* a lane with nothing of its own to do repeats the best */
             own[l] = l / each < count && which < from->count && from->energy[which] <= dear * from->energy[0]
-                && results[of].status != {{ view.prefix | upper }}_SOLVED;
+                && results[of].status != STEERING_SOLVED;
             open = open || own[l];
             set_size(task, l, from->size);
             for (i = 0; i < N; ++i) {
@@ -1011,7 +969,7 @@ static void polish(int count, const double *targets, problem *task, const {{ vie
         }
         spent = descend(task, &rule, &at, ready);
         for (l = 0; l < LANES; ++l) {
-            {{ view.prefix }}_result *result = results + l / each;
+            steering_result *result = results + l / each;
             const double E = LANE(at.E, l), F = LANE(at.F, l);
             const int good = E <= near && (E == F || F <= 1e-14 + 1e2 * LANE(task->floor, l));
             const double energy = energy_of(task, at.p, l);
@@ -1021,9 +979,9 @@ static void polish(int count, const double *targets, problem *task, const {{ vie
             if (l % each == 0) {
                 result->linearisations += spent;
             }
-            if (good ? (result->status != {{ view.prefix | upper }}_SOLVED || energy < result->cost)
-                     : (result->status != {{ view.prefix | upper }}_SOLVED && E < result->residual * result->residual)) {
-                result->status = good ? {{ view.prefix | upper }}_SOLVED : {{ view.prefix | upper }}_NOT_CONVERGED;
+            if (good ? (result->status != STEERING_SOLVED || energy < result->cost)
+                     : (result->status != STEERING_SOLVED && E < result->residual * result->residual)) {
+                result->status = good ? STEERING_SOLVED : STEERING_NOT_CONVERGED;
                 result->cost = energy;
                 result->residual = sqrt(E);
                 for (i = 0; i < N; ++i) {
@@ -1041,8 +999,8 @@ static void polish(int count, const double *targets, problem *task, const {{ vie
  * Solves `count` <= LANES targets: searches each, polishes the best candidates of all side by side, and goes on once with
  * those that are not solved.
  */
-static void solve_some(int count, const double *targets, const double *weights, const {{ view.prefix }}_options *options,
-    {{ view.prefix }}_result *results)
+static void solve_some(int count, const double *targets, const double *weights, const steering_options *options,
+    steering_result *results)
 {
     problem task;
     candidates list[LANES];
@@ -1061,19 +1019,19 @@ static void solve_some(int count, const double *targets, const double *weights, 
     for (attempt = 0; attempt < 2; ++attempt) {
         open = 0;
         for (k = 0; k < count; ++k) {
-            {{ view.prefix }}_result *result = results + k;
+            steering_result *result = results + k;
             if (attempt == 0) {
                 memset(result, 0, sizeof *result);
                 result->cost = HUGE_VAL;
                 result->residual = HUGE_VAL;
             }
-            if (result->status != {{ view.prefix | upper }}_SOLVED) {
+            if (result->status != STEERING_SOLVED) {
                 open = 1;
                 for (i = 0; i < SIZE; ++i) {
                     fill(task.target + i, 1, targets[k * SIZE + i]);
                 }
                 search(&task, options, result->starts, (attempt == 0 ? 1 : 4) * starts,
-                    {{ "1" if view.is_deep else "attempt > 0 || largest > 2.0 * least" }}, attempt,
+                    IS_DEEP || attempt > 0 || largest > 2.0 * least, attempt,
                     list + k, result);
             }
         }
@@ -1091,6 +1049,76 @@ static void solve_some(int count, const double *targets, const double *weights, 
         }
         for (i = 0; i < list[k].count; ++i) {
             results[k].agreeing += mean * list[k].energy[i] <= 1.01 * results[k].cost ? list[k].ended[i] : 0;
+        }
+    }
+}
+
+steering_options steering_defaults(void)
+{
+    steering_options options;
+    options.starts = DEFAULT_STARTS;
+    options.search_steps = DEFAULT_SEARCH_STEPS;
+    options.search_iterations = DEFAULT_SEARCH_ITERATIONS;
+    options.polish_steps = DEFAULT_POLISH_STEPS;
+    options.polish_iterations = DEFAULT_POLISH_ITERATIONS;
+    options.search_tolerance = DEFAULT_SEARCH_TOLERANCE;
+    options.tolerance = DEFAULT_TOLERANCE;
+    return options;
+}
+
+void steering_solve(int count, const double *targets, const double weights[M],
+    const steering_options *options, steering_result *results)
+{
+    double packed[LANES * SIZE];
+    int k, i, next;
+    for (k = 0; k < count; k += LANES) {
+        const int some = count - k < LANES ? count - k : LANES;
+        for (next = 0; next < some; ++next) {
+            for (i = 0; i < SIZE; ++i) {
+                packed[next * SIZE + i] = targets[(ptrdiff_t)(k + next) * FULL_SIZE + varying[i]];
+            }
+        }
+        solve_some(some, packed, weights, options, results + k);
+    }
+}
+
+void steering_sample(const double mu0[N], const double weights[M], int count, double *u,
+    double *X)
+{
+    V inverse_weights[M], y[FLOW];
+    double size = 0.0, error = 0.0;
+    int parts, k, s, i;
+    for (i = 0; i < M; ++i) {
+        fill(inverse_weights + i, 1, 1.0 / weights[i]);
+    }
+    for (i = 0; i < N; ++i) {
+        fill(y + i, 1, mu0[i]);
+        size += mu0[i] * mu0[i];
+    }
+    for (i = 0; i < SIZE; ++i) {
+        fill(y + N + i, 1, identity[i]);
+    }
+    size = (4.0 + 2.0 * sqrt(size)) / (count - 1);
+    parts = size < 256.0 ? (int)ceil(size) : 256;
+    for (k = 0;; ++k) {
+        for (i = 0; u != NULL && i < M; ++i) {
+            u[(ptrdiff_t)k * M + i] = LANE(y[control_of[i]], 0) / weights[i];
+        }
+        if (X != NULL) {
+            double *out = X + (ptrdiff_t)k * FULL_SIZE;
+            memset(out, 0, FULL_SIZE * sizeof *out);
+            for (i = 0; i < DEGREE; ++i) {
+                out[(FULL_SIZE / DEGREE + PARTS) * i] = 1.0;
+            }
+            for (i = 0; i < SIZE; ++i) {
+                out[varying[i]] = LANE(y[N + i], 0);
+            }
+        }
+        if (k + 1 >= count) {
+            return;
+        }
+        for (s = 0; s < parts; ++s) {
+            extrapolated_step(inverse_weights, 1.0 / ((double)(count - 1) * parts), y, &error);
         }
     }
 }
