@@ -11,16 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.log_iterations import matrix_log
 from lie_codegen.groups.matrix_group import MatrixGroup
-
-Array = NDArray[Any]
 
 #: Random elements of z tried, logarithms found before the search ends, and turns on either side.
 TRIES, ENOUGH, TURNS = 30, 3, 2
