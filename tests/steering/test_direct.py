@@ -224,6 +224,9 @@ def test_the_same_seed_gives_the_same_answer_and_guesses_are_starts() -> None:
         lc.steer(su2, 1j * SX, ("sx", "sy"), 6.0, guess=np.zeros((7, 3)), **QUBIT)
     copy = pickle.loads(pickle.dumps(one))
     np.testing.assert_array_equal(copy.u([1.0, 2.0]), one.u([1.0, 2.0]))
+    for name in ("inputs", "pieces", "system"):
+        assert copy.details[name] == one.details[name] == two.details[name]
+        assert len(repr(one.details[name]).splitlines()) <= 10
 
 
 def _task(name: str, controls: tuple[str, ...], **options: Any) -> Manoeuvre:

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.system import System
+from lie_codegen.values import Value
 
 
-@dataclass(frozen=True, eq=False)
-class Inputs:
+@dataclass(frozen=True, eq=False, repr=False)
+class Inputs(Value):
     """m inputs of time, linear on each piece; at a breakpoint the later piece counts.
 
     Attributes:
@@ -67,8 +68,8 @@ class Inputs:
         return Inputs(self.knots[-1] - self.knots[::-1], self.last[::-1].copy(), self.first[::-1].copy())
 
 
-@dataclass(frozen=True, eq=False)
-class Drive:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drive(Value):
     """(k,) times -> (k, n): the velocity sum_i u_i(t) b_i(t), with the drift or without."""
 
     system: System

@@ -13,10 +13,11 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.values import Value
 
 
-@dataclass(frozen=True, eq=False)
-class Velocity:
+@dataclass(frozen=True, eq=False, repr=False)
+class Velocity(Value):
     """An algebra element that may depend on time: a constant, formulas of t, or a function of t.
 
     Attributes:
@@ -99,8 +100,8 @@ def _by_label(group: MatrixGroup, value: dict[Any, Any], where: str) -> list[Any
     return [value.get(label, 0.0) for label in group.labels]
 
 
-@dataclass(frozen=True, eq=False)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(Value):
     """X' = X hat(drift + sum_i u_i b_i), or X' = hat(drift + sum_i u_i b_i) X, from `start`.
 
     Attributes:
