@@ -29,13 +29,15 @@ from lie_codegen.steering.direct.programme import Machine, Settings
 from lie_codegen.steering.direct.reach import require_reach
 from lie_codegen.steering.direct.report import cost_of, plan_of
 from lie_codegen.steering.direct.robust import robust
-from lie_codegen.steering.direct.search import Budget, Found, search
+from lie_codegen.steering.direct.search import LARGE, Budget, Found, search
 from lie_codegen.steering.direct.system import System, controls_of, velocity
 from lie_codegen.steering.goals import end_of
 from lie_codegen.steering.plan import Plan, Status
 
 _OBJECTIVES = ("energy", "fuel", "time", "none")
 _FUEL_TIMES = 4
+#: Steps of a descent on large groups, where each takes a tenth of a second.
+_LARGE_DESCENT = 40
 
 
 def direct(
@@ -58,7 +60,7 @@ def direct(
     pieces: int | None = None,
     iterations: int = 150,
     seed: int = 0,
-    polish: bool = True,
+    polish: bool | None = None,
     longest: float = 20.0,
     vertices: ArrayLike | None = None,
     progress: Callable[[str], None] | None = None,
@@ -82,7 +84,8 @@ def direct(
         pieces: of constant controls in the search, 48 (32 on large groups) if not given.
         iterations: most steps of each start in each stage; twice, three times ... as many to reach in later rounds.
         seed: of the guesses; the same seed, the same answer.
-        polish: whether the controls become continuous (energy); else they stay constant on each piece.
+        polish: whether the controls become continuous (energy); else they stay constant on each piece. Where not given, they do on
+            groups of up to 20 dimensions.
         longest: for "time": the longest duration allowed, in units of the given one.
         vertices: for "time": the (k, m) control vectors that arcs take, where the controls are not free in a box: (omega, v) = (+-1, +-1),
             (0, +-1) is the car of Reeds and Shepp, whose turning rate is bounded by its speed. Box vertices and zeros if not given.
@@ -109,6 +112,10 @@ def direct(
     if proof is not None:
         raise InfeasibleError(f"steer({group.name}): infeasible: {proof}", certificate=proof)
     settings = Settings(objective == "fuel", iterations, iterations)
+    large = group.dim > LARGE
+    polish = not large if polish is None else polish
+    if large:
+        settings = replace(settings, descend_iterations=min(_LARGE_DESCENT, iterations))
     if objective == "none":
         settings, polish = replace(settings, descend_iterations=0, wanted=1), False
     budget = Budget(starts, rounds, count, seed, settings)

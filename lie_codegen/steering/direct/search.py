@@ -18,7 +18,9 @@ _PLENTY = 4
 _EACH = 4
 _AGREEING = 0.01
 #: Dimension above which a few starts alone descend, and how many.
-_LARGE, _SIDE_BY_SIDE = 20, 8
+LARGE, _SIDE_BY_SIDE = 20, 8
+#: Dimension up to which all starts descend to the end; steps that they take together above it.
+_SMALL, _BEGINNING = 8, 40
 
 
 @dataclass(frozen=True)
@@ -83,10 +85,11 @@ def search(
     for round_ in range(budget.rounds):
         lanes = max(budget.starts, variants * (_EACH if settings.descend_iterations else 1))
         u = starts(task, budget.pieces, lanes, budget.seed, round_)
-        if guesses is not None and round_ == 0:
-            u = np.concatenate([guesses, u])
         # in blocks: kinds of starts alternate, and every variant should have all of them
-        variant = np.arange(len(u)) * variants // len(u)
+        variant = np.arange(lanes) * variants // lanes
+        if guesses is not None and round_ == 0:
+            u = np.concatenate([*[guesses] * variants, u])
+            variant = np.concatenate([np.repeat(np.arange(variants), len(guesses)), variant])
         u = with_free_slots(task, u, budget.seed + round_)
         # where a round failed the next one is more patient: of the starts for a gate at a quarter of its free phase's bounds 13 of 96
         # arrive within 150 steps, 36 within 400
@@ -105,7 +108,7 @@ def search(
     if not reached:
         nearest = int(np.nanargmin(size))
         return Found(u[nearest], int(variant[nearest]), float(size[nearest]), False, np.inf, total, 0, 0, tuple(tried))
-    if task.system.group.dim > _LARGE:
+    if task.system.group.dim > LARGE:
         # a descent takes seconds there: from the cheapest alone, as many as run side by side
         effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2))
         arrived = arrived[np.argsort(effort, kind="stable")[:_SIDE_BY_SIDE]]
@@ -116,9 +119,22 @@ def search(
         return Found(
             u[lane], int(variant[lane]), float(size[lane]), True, float(effort[best]), total, reached, 1, tuple(tried)
         )
-    lower = machine.descend(programme, task.goal(variant[arrived]), u[arrived], settings)
+    lower, which = _descended(task, programme, machine, settings, u[arrived], variant[arrived])
     say(f"descent from {len(arrived)} starts: {int(np.max(lower.used))} steps at most")
-    return _best(lower, variant[arrived], total, reached, tuple(tried))
+    return _best(lower, which, total, reached, tuple(tried))
+
+
+def _descended(
+    task: Manoeuvre, programme: Programme, machine: Machine, settings: Settings, u: Array, variant: Array
+) -> tuple[Reached, Array]:
+    """What controls that arrived descend to, and their variants. Where a descent is long, all take part in its beginning and as
+    many as run side by side, the cheapest, in the rest."""
+    if task.system.group.dim <= _SMALL or settings.descend_iterations <= _BEGINNING or len(u) <= _SIDE_BY_SIDE:
+        return machine.descend(programme, task.goal(variant), u, settings), variant
+    begun = machine.descend(programme, task.goal(variant), u, replace(settings, descend_iterations=_BEGINNING))
+    best = np.argsort(begun.cost, kind="stable")[:_SIDE_BY_SIDE]
+    rest = replace(settings, descend_iterations=settings.descend_iterations - _BEGINNING)
+    return machine.descend(programme, task.goal(variant[best]), begun.u[best], rest), variant[best]
 
 
 def threshold(task: Manoeuvre, settings: Settings) -> float:
