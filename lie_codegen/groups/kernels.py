@@ -40,7 +40,7 @@ _JACOBIANS = (
     "ljac(x) = sum_k ad_x^k / (k + 1)!, rjac(x) = ljac(-x); exp(x)' = hat(ljac x') exp(x) = exp(x) hat(rjac x')"
 )
 _EXP = "the power series, summed in closed form on the spectrum of hat(x)"
-_LOG = "the inverse of exp; principal: eigenvalues of hat(x) have imaginary parts in (-pi, pi]"
+_LOG = "checked: closed forms by membership, iterations by exp(-hat x) X; within 1e-5 of the group that of the nearest element"
 _AD = "X' = X hat(u) = hat(Ad_X u) X"
 _BRACKET = "the structure constants: [A_i, A_j] = sum_k c_ijk A_k"
 _DEFECT = "the conditions that the basis implies, found exactly"
@@ -109,7 +109,7 @@ def _log(data: GroupDerivation) -> Kernel:
     def body(ops: Arithmetic, X: Any) -> tuple[Any, ...]:
         return (log_coordinates(ops, data, X),)
 
-    formula = "exp(x_1 A_1 + ... + x_n A_n) = X, principal"
+    formula = "exp(x_1 A_1 + ... + x_n A_n) = X with the least sum of squares of turning angles; NaN where there is none"
     return _kernel(data, "log", [_matrix(data, "X")], [_vector(data, "x")], body, formula, _LOG)
 
 
