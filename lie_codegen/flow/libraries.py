@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.groups.build import build
@@ -40,7 +40,7 @@ def logarithms(group: MatrixGroup) -> Library:
 METHODS = ("rkmk4", "commutator_free")
 
 
-def step_of(group: MatrixGroup, method: str) -> Compiled:
+def step_of(group: MatrixGroup, method: str) -> Compiled[Any]:
     """The compiled step (X, u0, um, u1, h) -> X_next of a method.
 
     Raises:

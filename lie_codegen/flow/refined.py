@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from lie_codegen.arrays import Array
@@ -18,7 +20,7 @@ _MOST_STEPS, _MOST_SAMPLES = 2**26, 2**23
 
 
 def refined(
-    step: Compiled,
+    step: Compiled[Any],
     signal: Signal,
     eps: Array,
     start: Array,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from lie_codegen.arrays import Array
@@ -16,7 +18,7 @@ BLOCK = 16_384
 
 
 def rollout(
-    step: Compiled, grid: Grid, u: Signal, eps: Array, start: Array, name: str, threads: int = 1
+    step: Compiled[Any], grid: Grid, u: Signal, eps: Array, start: Array, name: str, threads: int = 1
 ) -> tuple[Array, float]:
     """The states at the output times, and the largest |h eps u| of any step.
 
@@ -41,7 +43,7 @@ def rollout(
 
 
 def _sampled(
-    step: Compiled, grid: Grid, u: Signal, eps: Array, start: Array, name: str, threads: int
+    step: Compiled[Any], grid: Grid, u: Signal, eps: Array, start: Array, name: str, threads: int
 ) -> tuple[Array, float]:
     many = start.ndim == 3 or eps.ndim == 1
     current = start if start.ndim == 3 or not many else np.repeat(start[None], len(eps), axis=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from lie_codegen.errors import InputError
 from lie_codegen.groups.group_library import GroupLibrary, group_library
@@ -23,6 +23,21 @@ if TYPE_CHECKING:
 
 #: What `generate(steering=)` adds is written by a floor above this one, named here and loaded when asked for.
 STEERING_PACKAGE = ("lie_codegen.steering.shooting.package", "render_steering_package")
+
+
+@overload
+def build(
+    what: MatrixGroup | str | Path, *, kernels: Sequence[str] | Literal["all"] = (), name: str | None = None
+) -> GroupLibrary: ...
+
+
+@overload
+def build(
+    what: Kernel | Sequence[MatrixGroup | Kernel | str | Path],
+    *,
+    kernels: Sequence[str] | Literal["all"] = (),
+    name: str | None = None,
+) -> Library: ...
 
 
 def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name: str | None = None) -> Library:

@@ -23,6 +23,7 @@ from lie_codegen.runtime.extension import prepare_extension
 from lie_codegen.runtime.library import Library, require_kernels
 
 if TYPE_CHECKING:
+    from lie_codegen.arrays import Array
     from lie_codegen.codegen.library_sources import LibrarySources
     from lie_codegen.groups.matrix_group import MatrixGroup
     from lie_codegen.kernel.kernel import Kernel
@@ -78,7 +79,32 @@ class GroupSources:
 
 
 class GroupLibrary(Library):
-    """A library that makes a kernel when it is first asked for; safe across threads and processes."""
+    """The kernels of a group, each made when it is first asked for; safe across threads and processes.
+
+    Attributes:
+        exp, log: x (n,) -> X (d, d), and back.
+        product_exp, wei_norman_matrix, wei_norman_rate: coordinates of the second kind g (n,) -> X, M(g), and (g, u) -> g'.
+        compose, inverse: X Y and X^-1. Ad, ad, bracket: (n, n), (n, n), (n,).
+        ljac, rjac, ljac_inv, rjac_inv: the left and right Jacobians of exp and their inverses, (n, n).
+        defect: how far X is from the group. renormalise: one step back to it.
+    """
+
+    exp: Compiled[Array]
+    log: Compiled[Array]
+    product_exp: Compiled[Array]
+    wei_norman_matrix: Compiled[Array]
+    wei_norman_rate: Compiled[Array]
+    compose: Compiled[Array]
+    inverse: Compiled[Array]
+    Ad: Compiled[Array]
+    ad: Compiled[Array]
+    bracket: Compiled[Array]
+    ljac: Compiled[Array]
+    rjac: Compiled[Array]
+    ljac_inv: Compiled[Array]
+    rjac_inv: Compiled[Array]
+    defect: Compiled[float]
+    renormalise: Compiled[Array]
 
     def __init__(
         self, namespace: str, kernels: Sequence[str], make: Callable[[str], Library], path: Path | None
@@ -95,7 +121,7 @@ class GroupLibrary(Library):
         logs = [self._made[name].build_log for name in self.kernels if name in self._made]
         return tuple(dict.fromkeys(line for log in logs for line in log))
 
-    def __getattr__(self, name: str) -> Compiled:
+    def __getattr__(self, name: str) -> Compiled[Any]:
         if name not in self.__dict__.get("kernels", ()):
             return super().__getattr__(name)
         with self._locks[name]:
@@ -103,7 +129,7 @@ class GroupLibrary(Library):
                 library = self._make(name)
                 self.__dict__[name] = library[name]
                 self._made[name] = library
-        function: Compiled = self.__dict__[name]
+        function: Compiled[Any] = self.__dict__[name]
         return function
 
     def compile(self, names: Iterable[str]) -> None:

@@ -99,7 +99,7 @@ def simulate_driven(
 
 
 def _run(
-    step: Compiled, grid: Grid, force: Signal, start: Array, inertias: dict[str, Array], n: int
+    step: Compiled[Any], grid: Grid, force: Signal, start: Array, inertias: dict[str, Array], n: int
 ) -> tuple[Array, float]:
     """The states at the output times, and the largest |h xi|; infinite where the state is not finite."""
     kept, move, current = [start[None]], 0.0, start

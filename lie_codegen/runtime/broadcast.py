@@ -12,7 +12,7 @@ from lie_codegen.errors import NotFiniteError, ShapeError
 from lie_codegen.runtime.call import Compiled
 
 
-def broadcast_call(function: Compiled, *arguments: ArrayLike) -> tuple[Array, ...]:
+def broadcast_call(function: Compiled[Any], *arguments: ArrayLike) -> tuple[Array, ...]:
     """Outputs of shape (..., *port.shape) of arguments of shape (..., *port.shape); batch axes broadcast.
 
     Raises:

@@ -103,7 +103,7 @@ def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> L
     namespace = _namespace(namespace, kernels)
     signatures = render_library(namespace, kernels).signatures  # refuses what C would refuse
     check_names(signatures)
-    functions = [
+    functions: list[Compiled[Any]] = [
         Compiled(signature, InterpretedBackend(function_of(kernel)), compiled=False)
         for signature, kernel in zip(signatures, kernels, strict=True)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,15 @@ from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.threads import in_parts
 
+if TYPE_CHECKING:
+    import inspect
 
-class Compiled:
+
+#: What a call gives: an array, a number, or a named tuple.
+Result = TypeVar("Result")
+
+
+class Compiled(Generic[Result]):
     """A callable kernel.
 
     Attributes:
@@ -29,7 +36,7 @@ class Compiled:
     """
 
     def __init__(self, signature: Signature, backend: Backend, *, compiled: bool) -> None:
-        self.name = signature.name
+        self.name = self.__name__ = signature.name
         self.inputs = signature.inputs
         self.outputs = signature.outputs
         self.compiled = compiled
@@ -40,7 +47,22 @@ class Compiled:
         self.result_type: Any = namedtuple(f"{signature.name}_result", fields) if len(fields) > 1 else None
         self._scalar = not signature.outputs[0].shape
 
-    def __call__(self, *args: Any, out: Any = None, **named: Any) -> Any:
+    @property
+    def __signature__(self) -> inspect.Signature:
+        """The ports as parameters: what `inspect.signature`, completion and `help` show."""
+        import inspect
+
+        inputs = [
+            inspect.Parameter(
+                python_field(port.name), inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=f"{describe(port)}"
+            )
+            for port in self.inputs
+        ]
+        out = inspect.Parameter("out", inspect.Parameter.KEYWORD_ONLY, default=None)
+        returned = ", ".join(f"{port.name}: {describe(port)}" for port in self.outputs)
+        return inspect.Signature([*inputs, out], return_annotation=returned)
+
+    def __call__(self, *args: Any, out: Any = None, **named: Any) -> Result:
         """Evaluate once.
 
         Args:
@@ -59,7 +81,8 @@ class Compiled:
         arrays = [checked(self.name, port, value) for port, value in zip(self.inputs, values, strict=True)]
         outputs = outputs_for(self.signature, out, ())
         self.backend.call(arrays, outputs)
-        return self._wrap(outputs, out, scalars=True)
+        result: Result = self._wrap(outputs, out, scalars=True)
+        return result
 
     def batch(self, *args: Any, out: Any = None, threads: int = 1, **named: Any) -> Any:
         """Evaluate N times: an input has a leading axis of length N, or is the same for all.

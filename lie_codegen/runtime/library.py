@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CodegenError, InputError
@@ -32,7 +32,7 @@ class Library:
     def __init__(
         self,
         namespace: str,
-        functions: Sequence[Compiled],
+        functions: Sequence[Compiled[Any]],
         path: Path | None,
         build_log: Sequence[str] = (),
         lanes: Callable[[], int] | None = None,
@@ -52,7 +52,7 @@ class Library:
             return self._notes
         return (f"batches: {self._lanes()} samples at a time", *self._notes)
 
-    def __getattr__(self, name: str) -> Compiled:
+    def __getattr__(self, name: str) -> Compiled[Any]:
         kernels = self.__dict__.get("kernels", ())
         import difflib
 
@@ -60,10 +60,10 @@ class Library:
         hint = f"; near: {', '.join(close)}" if close else f"; it has {', '.join(kernels)}"
         raise AttributeError(f"the library {self.__dict__.get('namespace')} has no kernel {name!r}{hint}")
 
-    def __getitem__(self, name: str) -> Compiled:
+    def __getitem__(self, name: str) -> Compiled[Any]:
         if name not in self.kernels:
             raise KeyError(name)
-        function: Compiled = getattr(self, name)
+        function: Compiled[Any] = getattr(self, name)
         return function
 
     def __dir__(self) -> list[str]:

@@ -15,7 +15,7 @@ from lie_codegen.runtime.lane_library import LaneLibrary
 _MOST_PORTS = 32
 
 
-def quick(compiled: Compiled, library: ctypes.CDLL, lanes: LaneLibrary, signature: Signature) -> Compiled:
+def quick(compiled: Compiled[Any], library: ctypes.CDLL, lanes: LaneLibrary, signature: Signature) -> Compiled[Any]:
     """`compiled` behind a fast path for exact arguments; itself where there is no extension.
 
     What the fast path does not take, and every attribute but `batch`, is that of `compiled`.
@@ -36,7 +36,7 @@ def quick(compiled: Compiled, library: ctypes.CDLL, lanes: LaneLibrary, signatur
 
     call = _address(library, f"{signature.symbol}_call")
     fast = module.function(call, 0, inputs, outputs, compiled, compiled, samples, compiled.result_type)
-    return cast(Compiled, fast)
+    return cast("Compiled[Any]", fast)
 
 
 def _address(library: ctypes.CDLL, symbol: str) -> int:
