@@ -13,6 +13,9 @@ import sympy as sp
 from lie_codegen.control.attitude import gyroscopic_factor
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_number, real_number
+from lie_codegen.groups.catalogue_load import group
+from lie_codegen.groups.maps.admission import NEAR_GROUP
+from lie_codegen.groups.maps.guard import kept_where, nan_off_group
 from lie_codegen.groups.maps.rotation_log import half_angle_ratio, rotation_log
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
@@ -79,13 +82,14 @@ def attitude_law(
     if kind == "pd":
         if inertia is None or k_d is None:
             raise InputError("the attitude law 'pd' needs inertia and k_d")
-        return replace(_proportional_derivative(inertia, k_p, k_d, gyroscopic), name=name or "attitude_pd")
+        law = replace(_proportional_derivative(inertia, k_p, k_d, gyroscopic), name=name or "attitude_pd")
+        return nan_off_group(law, group("so3"), ("X",))
     if inertia is not None:
         body_inertia(inertia)
     if k_d is not None:
         positive_number(k_d, "k_d")
     gyroscopic_factor(gyroscopic)
-    made = _proportional(k_p) if kind == "p" else _reduced(k_p, z)
+    made = nan_off_group(_proportional(k_p), group("so3"), ("X",)) if kind == "p" else _reduced(k_p, z)
     return replace(made, name=name or made.name)
 
 
@@ -154,11 +158,13 @@ def _reduced(k_p: Any, z: Sequence[Any]) -> Kernel:
 
     def body(ops: Arithmetic, y: Vector) -> tuple[Any, ...]:
         axis = [number(ops, entry) for entry in unit]
+        of_unit_length = ops.less(ops.fabs(dot(y, y) - 1), ops.constant(2 * NEAR_GROUP))
         normal, cosine = cross(axis, y), dot(axis, y)
         ratio = _angle_over_sine(ops, dot(normal, normal), cosine)
         error, gain = scaled(ratio, normal), number(ops, k)
         square = dot(error, error)
-        return scaled(gain, error), square / 2, -gain * square
+        values = (scaled(gain, error), square / 2, -gain * square)
+        return tuple(kept_where(ops, [of_unit_length], value) for value in values)
 
     return Kernel(
         name="attitude_reduced",

@@ -106,7 +106,7 @@ def _kind(group: MatrixGroup) -> str:
 def _frobenius(group: MatrixGroup, gains: Gains) -> ErrorFunction:
     symbols = ErrorSymbols(group)
     k = positive_number(gain(gains, "k_p", "the error function frobenius"), "k_p")
-    error = symbols.X_d_inverse * symbols.X - sp.eye(symbols.X.rows)
+    error = symbols.X_d_inverse * (symbols.X - symbols.X_d)  # X_d^-1 X - 1 without its cancellation
     return ErrorFunction(
         "frobenius", group, k * sp.Add(*[entry**2 for entry in error.flat()]) / 2, "right",
         description="sum of squares of X_d^-1 X - 1; left-invariant",
@@ -117,8 +117,7 @@ def _rotations(group: MatrixGroup, name: str, side: str, gains: Gains) -> ErrorF
     symbols = ErrorSymbols(group)
     K = attitude_gain(gain(gains, "K_p", f"the error function {name}"), group.degree, "K_p")
     R, R_d = symbols.X, symbols.X_d
-    relative = R_d.T * R if side == "right" else R * R_d.T
-    return ErrorFunction(name, group, _attitude(K, relative), side, constant=_least_pair(K))
+    return ErrorFunction(name, group, _attitude(K, R - R_d, side), side, constant=_least_pair(K))
 
 
 def _motions(group: MatrixGroup, row: str, gains: Gains) -> ErrorFunction:
@@ -134,20 +133,30 @@ def _motions(group: MatrixGroup, row: str, gains: Gains) -> ErrorFunction:
         "2": lambda: S.T * (p - q),
         "3": lambda: R.T * (p - q),
         "4": lambda: (R.T + S.T) * (p - q),
-        "5": lambda: (R + S) * (R.T * p - S.T * q),
-        "6": lambda: R.T * p - S.T * q,
+        "5": lambda: (R + S) * difference,
+        "6": lambda: difference,
     }
-    relative = S.T * R if row in "1234" else R * S.T
-    x = offset[row]()
-    phi = _attitude(K1, relative) + (x.T * K2 * x)[0, 0] / 2
+    difference = R.T * (p - q) + (R - S).T * q  # R^T p - S^T q: both terms are small near the reference
+    phi = _attitude(K1, R - S, "right" if row in "1234" else "left") + _square(K2, offset[row]()) / 2
     kind, tau = {"1": ("element", _element(R.T * S, 0 * p)), "5": ("left", None), "6": (
         "element", _element(sp.eye(e), S.T * q - R.T * p))}.get(row, ("right", None))  # fmt: skip
     return ErrorFunction(name, group, phi, kind, tau, None, _least_pair(K1), _ROWS[row])
 
 
-def _attitude(K: sp.MatrixBase, relative: sp.MatrixBase) -> sp.Expr:
-    """tr(K (1 - R_e))/2."""
-    return (K.trace() - (K * relative).trace()) / 2
+def _attitude(K: sp.MatrixBase, difference: sp.MatrixBase, side: str) -> sp.Expr:
+    """tr(K (1 - R_e))/2 from R - R_d, for R_e = R_d^T R ("right") or R R_d^T ("left").
+
+    As (1 - R_e)^T (1 - R_e) = 2 - R_e - R_e^T and K is symmetric, it is tr(K (R - R_d)^T (R - R_d))/4: 1 - R_e, of second order
+    in the angle, would be the difference of numbers of size 1, and half of its digits noise at 1e-8 rad.
+    """
+    columns = difference if side == "right" else difference.T
+    return sp.Add(*[_square(K, columns[r, :].T) for r in range(columns.rows)]) / 4
+
+
+def _square(K: sp.MatrixBase, x: sp.MatrixBase) -> sp.Expr:
+    """x^T K x, term by term: SymPy would multiply a number into the differences x_i, and so undo them."""
+    pairs = [(i, j) for i in range(x.rows) for j in range(i, x.rows) if K[i, j] != 0]
+    return sp.Add(*[sp.Mul(K[i, j] * (1 if i == j else 2), x[i], x[j]) for i, j in pairs])
 
 
 def _element(R: sp.MatrixBase, p: sp.MatrixBase) -> sp.ImmutableMatrix:

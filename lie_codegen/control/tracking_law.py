@@ -28,6 +28,7 @@ from lie_codegen.control.error_function import ErrorFunction, error_function
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -102,7 +103,7 @@ def tracking_law(
         return (random_element(group, data, rng), vector(), random_element(group, data, rng), vector(), vector())
 
     n, speed = group.dim, velocity_units(group)
-    return Kernel(
+    law = Kernel(
         name=name,
         namespace=group.name,
         inputs=(
@@ -123,6 +124,7 @@ def tracking_law(
         source="Bullo and Murray, CIT-CDS 97-003, (28), (29), Theorem 4.2",
         sampler=sampler,
     )
+    return nan_off_group(law, group, ("X", "X_d"))
 
 
 def as_error(group: MatrixGroup, error: Any, gains: Mapping[str, Any]) -> ErrorFunction:
