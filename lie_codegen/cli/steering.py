@@ -23,7 +23,10 @@ def steer(
     controls: Annotated[str, _Optional(help="Comma-separated labels of the actuated basis elements.")],
     duration: Annotated[float, _Optional(help="Seconds.")] = 1.0,
     method: Annotated[
-        str, _Optional(help="auto, four_phase, circle, loops, area_rule, optimal, transcription or feedback.")
+        str,
+        _Optional(
+            help="auto, direct, four_phase, swing_twist, circle, loops, area_rule, optimal, transcription or feedback."
+        ),
     ] = "auto",
     weights: Annotated[
         str | None, _Optional(help="Positive weights of the controls' energies, comma-separated.")
@@ -42,7 +45,7 @@ def steer(
     rate_bounds: Annotated[str | None, _Optional(help=f"Limits of the controls' rates: {_LIMITS}")] = None,
     rest: Annotated[bool | None, _Optional("--rest", help="Controls are zero at both ends.")] = None,
     periodic: Annotated[bool | None, _Optional("--periodic", help="Controls end as they begin: a gait.")] = None,
-    objective: Annotated[str | None, _Optional(help="energy or time.")] = None,
+    objective: Annotated[str | None, _Optional(help="energy, time; of direct also fuel and none (reach only).")] = None,
     drift: Annotated[str | None, _Optional(help="Constant velocity beside the controls', comma-separated.")] = None,
     via: Annotated[
         list[str] | None, _Optional(help="FRACTION@COORDINATES: a point to pass through, say 0.5@0.1,0,0; repeatable.")
@@ -52,6 +55,9 @@ def steer(
     ] = None,
     ball: Annotated[list[str] | None, _Optional(help="CENTER@RADIUS: keep out of a ball; repeatable.")] = None,
     intervals: Annotated[int | None, _Optional(help="Of transcription: pieces of the controls.")] = None,
+    pieces: Annotated[int | None, _Optional(help="Of direct: constant pieces of the search.")] = None,
+    seed: Annotated[int | None, _Optional(help="Of direct: of the first guesses.")] = None,
+    equation: Annotated[str | None, _Optional(help="Of direct: left (X' = X u^) or right (X' = u^ X).")] = None,
     picture: Annotated[Path | None, _Optional(help="File for a picture of the plan: png, svg or pdf.")] = None,
     samples: Annotated[int, _Optional(help="Number of control samples in the JSON object.")] = 101,
     json: Json = False,
@@ -78,6 +84,9 @@ def steer(
         "rest": rest,
         "periodic": periodic,
         "objective": objective,
+        "pieces": pieces,
+        "seed": seed,
+        "equation": equation,
         "drift": None if drift is None else numbers(drift, "--drift"),
         "via": [via_point(text) for text in via] if via else None,
         "obstacles": obstacles or None,
@@ -87,7 +96,7 @@ def steer(
     names = [name.strip() for name in controls.split(",")]
     goal = numbers(target, "--target", g.labels)
     plan = plan_steering(g, goal, names, duration, method, **given)
-    t = np.linspace(0, duration, max(2, samples))
+    t = np.linspace(0, plan.duration, max(2, samples))
     data = {
         "group": g.name,
         "method": plan.method,

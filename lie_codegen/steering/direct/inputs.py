@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,9 +21,9 @@ class Inputs(Value):
         first, last: (K, m) at the ends of each piece.
     """
 
-    knots: Array = field(repr=False)
-    first: Array = field(repr=False)
-    last: Array = field(repr=False)
+    knots: Array
+    first: Array
+    last: Array
 
     @staticmethod
     def constant(knots: Array, values: Array) -> Inputs:
