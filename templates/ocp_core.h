@@ -43,6 +43,7 @@ typedef struct {
     real stage[OCP_STAGES][NX * NC];    /* derivative of the stage by its own arguments */
     real total[NX];
     real total_slope[NX * NV];
+    real Ad[OCP_DIM * OCP_DIM];         /* of exp(-total) */
     real right[OCP_DIM * OCP_DIM];      /* right Jacobian at the total */
 } chain;
 
@@ -152,7 +153,7 @@ static void step(const real *x, const real *u, const real *p, real t, real h, re
  */
 static void linear_step(const real *x, const real *u, const real *p, real t, real h, real *next, real *J, chain *c)
 {
-    real k[NX], slope[NX * NV], by_d[NX * NV], by_y[NX * NX], Ad[OCP_DIM * OCP_DIM];
+    real k[NX], slope[NX * NV], by_d[NX * NV], by_y[NX * NX];
     int i, j, s;
     clear(c->total, NX);
     clear(c->total_slope, NX * NV);
@@ -186,12 +187,12 @@ static void linear_step(const real *x, const real *u, const real *p, real t, rea
         }
     }
     model_move(x, c->total, next);
-    model_move_jacobian(c->total, Ad, c->right);
+    model_move_jacobian(c->total, c->Ad, c->right);
     clear(J, NX * NV);
     add_product(J, c->right, c->total_slope, OCP_DIM, OCP_DIM, NV, 1);
     for (i = 0; i < OCP_DIM; ++i) {
         for (j = 0; j < OCP_DIM; ++j) {
-            J[i * NV + j] += Ad[i * OCP_DIM + j];
+            J[i * NV + j] += c->Ad[i * OCP_DIM + j];
         }
     }
     for (i = OCP_DIM; i < NX; ++i) {
@@ -224,19 +225,28 @@ static void add_chained(real *Q, const real *H, const real *Y)
 static void add_step_curvature(const real *x, const real *u, const real *p, real t, real h, const chain *c,
     const real *mu, real *H)
 {
-    real ends[4 * OCP_DIM * OCP_DIM], T[2 * OCP_DIM * NV], curve[NC * NC], nu[NX], m[NX], back[NX];
+    real S[OCP_DIM * OCP_DIM], C[OCP_DIM * OCP_DIM], CJ[OCP_DIM * NV], T[OCP_DIM * NV], curve[NC * NC], nu[NX], m[NX], back[NX];
     int i, j, s;
-    /* the end of the chain, X exp(eta) exp(Theta + dTheta): second order in (eta, dTheta) */
-    model_move_hessian(c->total, mu, ends);
-    clear(T, 2 * OCP_DIM * NV);
-    for (i = 0; i < 2 * OCP_DIM; ++i) {
-        copy(T + i * NV, ends + i * 2 * OCP_DIM, OCP_DIM);
-        add_product(T + i * NV, ends + i * 2 * OCP_DIM + OCP_DIM, c->total_slope, 1, OCP_DIM, NV, 1);
+    /*
+     * The end of the chain, X exp(eta) exp(Theta + dTheta), to second order in (eta, dTheta): dTheta' S dTheta / 2 from the right
+     * Jacobian, and a' C b / 2 from the bracket [a, b], a = Ad eta, b = J_r dTheta, twice for its two places in the Hessian.
+     */
+    model_move_hessian(c->total, mu, S, C);
+    clear(T, OCP_DIM * NV);
+    add_product(T, S, c->total_slope, OCP_DIM, OCP_DIM, NV, 1);
+    add_transposed(H, c->total_slope, T, OCP_DIM, NV, NV);
+    clear(T, OCP_DIM * NV);
+    clear(CJ, OCP_DIM * NV);
+    add_product(T, c->right, c->total_slope, OCP_DIM, OCP_DIM, NV, (real)0.5);
+    add_product(CJ, C, T, OCP_DIM, OCP_DIM, NV, 1);
+    clear(T, OCP_DIM * NV);
+    add_transposed(T, c->Ad, CJ, OCP_DIM, OCP_DIM, NV);
+    for (i = 0; i < OCP_DIM; ++i) {
+        for (j = 0; j < NV; ++j) {
+            H[i * NV + j] += T[i * NV + j];
+            H[j * NV + i] += T[i * NV + j];
+        }
     }
-    for (i = 0; i < OCP_DIM * NV; ++i) {
-        H[i] += T[i];
-    }
-    add_transposed(H, c->total_slope, T + OCP_DIM * NV, OCP_DIM, NV, NV);
     clear(nu, NX);
     add_transposed(nu, c->right, mu, OCP_DIM, OCP_DIM, 1);
     copy(nu + OCP_DIM, mu + OCP_DIM, OCP_Q);

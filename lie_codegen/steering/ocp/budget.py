@@ -52,7 +52,9 @@ def budget_of(view: SolverView, iterations: int) -> Budget:
     after = 2 * N * count.get("model_path", 0) + step
     size = 4 if view.real == "float" else 8
     arrays = 4 * nv * nv + 2 * nv + nx * nv + nx * nx  # Q, W, H and the pulled-back block; gradients; J; P
-    arrays += s * (nx + nx * nv + nx * nc) + nx * nv + view.dim**2 + 2 * nx * nv + nx * nx + view.dim**2  # the chain
+    arrays += (
+        s * (nx + nx * nv + nx * nc) + nx * nv + 2 * view.dim**2 + 2 * nx * nv + nx * nx + view.dim**2
+    )  # the chain
     arrays += max(nc, nv) * nv + 3 * view.stored + view.path * (nv + 2) + view.end * (nx + 2) + 8 * m * m
     return Budget(
         usual=iterations * (sweep + rollout) + after,

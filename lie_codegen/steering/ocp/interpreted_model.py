@@ -11,8 +11,8 @@ from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.model import Model
 from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
 
-#: Arguments, their derivatives and the stages' own derivatives, the total and its derivative, the right Jacobian.
-Chain = tuple[list[Array], list[Array], list[Array], Array, Array, Array]
+#: Arguments, their derivatives and the stages' own derivatives, the total and its derivative, Ad(exp(-total)), the right Jacobian.
+Chain = tuple[list[Array], list[Array], list[Array], Array, Array, Array, Array]
 
 
 class InterpretedModel:
@@ -76,16 +76,16 @@ class InterpretedModel:
         J[:n, :n] += Ad
         J[n:, n:] += np.eye(nx - n + m)
         following = self._run("model_move", x, total)[0]
-        return following, J, (arguments, slopes, stages, total, slope, right)
+        return following, J, (arguments, slopes, stages, total, slope, Ad, right)
 
     def curvature(self, x: Array, u: Array, p: Array, t: float, h: float, chain: Chain, mu: Array) -> Array:
         """(nv, nv) Hessian of mu . F."""
         n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
-        arguments, slopes, stages, total, slope, right = chain
+        arguments, slopes, stages, total, slope, Ad, right = chain
         direct = np.hstack([np.eye(n), np.zeros((n, nx - n + m))])
-        ends = self._run("model_move_hessian", total, mu)[0].reshape(2 * n, 2 * n)
-        L = np.vstack([direct, slope[:n]])
-        H = L.T @ ends @ L
+        S, C = (flat.reshape(n, n) for flat in self._run("model_move_hessian", total, mu))
+        mixed = direct.T @ Ad.T @ C @ right @ slope[:n] / 2
+        H = slope[:n].T @ S @ slope[:n] + mixed + mixed.T
         nu = np.concatenate([right.T @ mu[:n], mu[n:]])
         back = np.zeros(nx)
         others = np.hstack([np.zeros((nx - n + m, n)), np.eye(nx - n + m)])

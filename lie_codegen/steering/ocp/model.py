@@ -21,16 +21,19 @@ import casadi as ca
 
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.log_routine import log_coordinates
+from lie_codegen.groups.maps.log_routine import vee
+from lie_codegen.groups.maps.logarithm import candidate
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.rkmk import bracket_body, hat_body
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
-from lie_codegen.kernel.linear import matmul
+from lie_codegen.kernel.linear import ad_star, matmul
 from lie_codegen.steering.ocp.problem_data import ProblemData, total_square
 from lie_codegen.steering.ocp.terms import Point, derivation
 
 _OPS = CasadiArithmetic()
+#: Terms of the series of J_r' lambda: to 1e-12 for |ad theta| <= 1, and curvature alone depends on it.
+_SERIES = 16
 
 
 @dataclass(frozen=True)
@@ -170,7 +173,7 @@ class ModelBuilder:
         other = ca.SX.sym("other", self.x.numel())
         Y = unpack(self.group, ca.vertsplit(other)[: self.size])
         inverse = matrices.write(matrices.inverse(matrices.read(X)))
-        log = log_coordinates(_OPS, self.exact, matmul(inverse, Y))
+        log = self._local(matmul(inverse, Y))
         d = ca.vertcat(_column(log), other[self.size :] - self.x[self.size :])
         functions = [
             self._function("model_move", [self.x, self.y], {"next": ca.vertcat(*moved, *z)}),
@@ -179,15 +182,40 @@ class ModelBuilder:
         ]
         if second_order:
             weights = mu[:n]
-            across = ca.vertsplit(weights)
-            units_x = [ca.SX(bracket_entry) for bracket_entry in self._bracket_form(across)]
-            C = ca.reshape(ca.vertcat(*units_x), n, n).T
+            pulled = self._pulled_back(weights, right)
             # (lambda . J_r(theta) omega) differentiated once by each: the quadratic form is its symmetric part
-            by_theta = ca.jacobian(right.T @ weights, self.y[:n])
-            mixed = Ad.T @ C @ right / 2
-            H = ca.vertcat(ca.horzcat(ca.SX.zeros(n, n), mixed), ca.horzcat(mixed.T, (by_theta + by_theta.T) / 2))
-            functions.append(self._function("model_move_hessian", [self.y, mu], {"H": H}))
+            by_theta = ca.jacobian(pulled, self.y[:n])
+            C = ca.reshape(ca.vertcat(*map(ca.SX, self._bracket_form(ca.vertsplit(weights)))), n, n).T
+            outputs = {"S": (by_theta + by_theta.T) / 2, "C": C}
+            functions.append(self._function("model_move_hessian", [self.y, mu], outputs))
         return functions
+
+    def _pulled_back(self, weights: Any, right: Any) -> Any:
+        """J_r(theta)' lambda; where J_r has no closed form by sum_k (-ad*)^k lambda / (k + 1)!, a tenth of the derivatives."""
+        if self.exact.adjoint_pattern is not None:
+            return right.T @ weights
+        theta = ca.vertsplit(self.y)[: self.n]
+        power: list[Any] = ca.vertsplit(weights)
+        total, factorial = list(power), 1.0
+        for k in range(1, _SERIES + 1):
+            power = ad_star(_OPS, self.group.algebra, theta, power)
+            factorial *= k + 1
+            total = [a + b * ((-1) ** k / factorial) for a, b in zip(total, power, strict=True)]
+        return ca.vertcat(*[ca.SX(entry) for entry in total])
+
+    def _local(self, M: Any) -> Any:
+        """Local coordinates of M near the identity: its logarithm, where that has a closed form; else D - D^2/2 + D^3/3, D = M - I.
+
+        The feedback only needs a chart that agrees with the logarithm to second order; the line search looks after the rest.
+        """
+        if self.exact.log_structure.is_closed:
+            return candidate(_OPS, self.exact, M)
+        d = range(self.group.degree)
+        D = [[_add(-1 if i == j else 0, M[i][j]) for j in d] for i in d]
+        square = matmul(D, D)
+        cube = matmul(square, D)
+        series = [[D[i][j] - _half(square[i][j]) + cube[i][j] * (1 / 3) for j in d] for i in d]
+        return vee(_OPS, self.exact, series)
 
     def _bracket_form(self, weights: Sequence[Any]) -> list[Any]:
         """The matrix of (a, b) -> lambda . [a, b], row by row."""
