@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
+from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import UnknownGroupError
 from lie_codegen.groups.catalogue_names import definition_source, group_path, is_generated, plain_name
 from lie_codegen.groups.families import family
@@ -45,6 +46,15 @@ def as_group(value: GroupLike, where: str = "") -> MatrixGroup:
     if isinstance(value, str | Path):
         return group(value)
     return require_group(value, where) if where else group(value)
+
+
+def as_algebra(value: GroupLike | LieAlgebra, where: str) -> LieAlgebra:
+    """The algebra itself, or that of a group, of its name or of its file.
+
+    Raises:
+        InputError: as `as_group`.
+    """
+    return value if isinstance(value, LieAlgebra) else as_group(value, where).algebra
 
 
 def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:

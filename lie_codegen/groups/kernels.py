@@ -109,7 +109,9 @@ def _log(data: GroupDerivation) -> Kernel:
     def body(ops: Arithmetic, X: Any) -> tuple[Any, ...]:
         return (log_coordinates(ops, data, X),)
 
-    formula = "exp(x_1 A_1 + ... + x_n A_n) = X with the least sum of squares of turning angles; NaN where there is none"
+    formula = (
+        "exp(x_1 A_1 + ... + x_n A_n) = X with the least sum of squares of turning angles; NaN where there is none"
+    )
     return _kernel(data, "log", [_matrix(data, "X")], [_vector(data, "x")], body, formula, _LOG)
 
 

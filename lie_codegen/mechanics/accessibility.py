@@ -17,13 +17,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import sympy as sp
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.numbers import domain_matrix, exact_number
-from lie_codegen.mechanics.connection import symmetric_product
+from lie_codegen.exact.positive_matrix import positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
+from lie_codegen.mechanics.connection import metric_of, symmetric_product
 from lie_codegen.mechanics.euler_poincare import bracket, euler_poincare, velocity_symbols
 
 _DEGREE = 4
@@ -53,13 +56,13 @@ class SecondOrderControllability:
 
 
 def second_order_controllability(
-    algebra: LieAlgebra, inertia: sp.MatrixBase, forces: Sequence[Sequence[sp.Expr]], degree: int = _DEGREE
+    group: GroupLike | LieAlgebra, inertia: Any, forces: Sequence[Any], degree: int = _DEGREE
 ) -> SecondOrderControllability:
     """Accessibility and controllability from rest by symmetric products, exact.
 
     Args:
-        algebra: the group's algebra.
-        inertia: (n, n) exact, positive definite.
+        group: the group, its name, its file, or its algebra.
+        inertia: a number, (n,) or (n, n), positive definite; numbers or exact texts.
         forces: body covectors f_a, (n,) each, or labels of basis elements.
         degree: highest degree of symmetric products looked at.
 
@@ -67,6 +70,8 @@ def second_order_controllability(
         ShapeError: a force has not n entries.
         InputError: no force.
     """
+    algebra = as_algebra(group, "second_order_controllability")
+    inertia = metric_of(algebra, inertia)
     fields = [list(inertia.inv() * sp.Matrix(force)) for force in force_vectors(algebra, forces)]
     levels = _symmetric_levels(algebra, inertia, fields, degree)
     growth: list[int] = []
@@ -97,10 +102,10 @@ def second_order_controllability(
 
 
 def accessibility_rank(
-    algebra: LieAlgebra,
-    inertia: sp.MatrixBase,
-    forces: Sequence[Sequence[sp.Expr]],
-    xi: Sequence[sp.Expr] | None = None,
+    group: GroupLike | LieAlgebra,
+    inertia: Any,
+    forces: Sequence[Any],
+    xi: Sequence[Any] | None = None,
     depth: int = 4,
 ) -> int:
     """Rank at (1, xi) of the Lie algebra of drift and control fields on G x g, 2 n for full accessibility.
@@ -111,6 +116,8 @@ def accessibility_rank(
     Raises:
         ShapeError: a force or xi has not n entries.
     """
+    algebra = as_algebra(group, "accessibility_rank")
+    inertia = metric_of(algebra, inertia)
     n = algebra.dim
     symbols = velocity_symbols(algebra)
     zero = [sp.S.Zero] * n
@@ -144,7 +151,7 @@ class DirectionObservability:
 
 
 def direction_observability(
-    inertia: sp.MatrixBase, y: Sequence[sp.Expr], omega: Sequence[sp.Expr], derivatives: int = 5
+    inertia: Any, y: Sequence[Any], omega: Sequence[Any], derivatives: int = 5
 ) -> DirectionObservability:
     """Rank of d(y, y', ..., y^(k)) on S^2 x R^3 along y' = y x omega, I omega' = I omega x omega, exact at a point.
 
@@ -157,6 +164,7 @@ def direction_observability(
     """
     if len(y) != 3 or len(omega) != 3:
         raise ShapeError("y and omega have three entries each")
+    inertia = inertia if isinstance(inertia, sp.MatrixBase) else positive_matrix(inertia, 3, "inertia")
     ys, ws = sp.symbols("y1:4", real=True), sp.symbols("w1:4", real=True)
     Y, W = sp.Matrix(ys), sp.Matrix(ws)
     flow = list(Y.cross(W)) + list(inertia.inv() * (inertia * W).cross(W))

@@ -12,10 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any
 
 import sympy as sp
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.errors import ShapeError
+from lie_codegen.exact.numbers import exact_number
+from lie_codegen.exact.positive_matrix import positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
 from lie_codegen.mechanics.euler_poincare import ad_star, bracket
 
 
@@ -33,13 +38,36 @@ def nabla(algebra: LieAlgebra, inertia: sp.MatrixBase, x: Sequence[sp.Expr], y: 
     return _nabla(algebra, inertia, inertia.inv(), x, y)
 
 
-def symmetric_product(
-    algebra: LieAlgebra, inertia: sp.MatrixBase, x: Sequence[sp.Expr], y: Sequence[sp.Expr]
-) -> list[sp.Expr]:
-    """<x : y> = nabla_x y + nabla_y x = -I^{-1}(ad*_x I y + ad*_y I x)."""
+def symmetric_product(group: GroupLike | LieAlgebra, inertia: Any, x: Sequence[Any], y: Sequence[Any]) -> list[sp.Expr]:
+    """<x : y> = nabla_x y + nabla_y x = -I^{-1}(ad*_x I y + ad*_y I x), exact.
+
+    Args:
+        group: the group, its name, its file, or its algebra.
+        inertia: a number, (n,) or (n, n), positive definite; numbers or exact texts.
+        x, y: (n,) vectors of the algebra, numbers or exact texts.
+
+    Raises:
+        ShapeError, InputError: naming the culprit.
+    """
+    algebra = as_algebra(group, "symmetric_product")
+    inertia = metric_of(algebra, inertia)
+    x, y = ([entry if isinstance(entry, sp.Expr) else exact_number(entry) for entry in each] for each in (x, y))
+    if len(x) != algebra.dim or len(y) != algebra.dim:
+        raise ShapeError(
+            f"symmetric_product: x and y have {len(x)} and {len(y)} entries; {algebra.name} has {algebra.dim}"
+        )
     inverse = inertia.inv()
     a, b = (_nabla(algebra, inertia, inverse, *pair) for pair in ((x, y), (y, x)))
     return [sp.expand(p + q) for p, q in zip(a, b, strict=True)]
+
+
+def metric_of(algebra: LieAlgebra, inertia: Any) -> sp.MatrixBase:
+    """(n, n) exact; a SymPy matrix, which may hold symbols, as it is.
+
+    Raises:
+        ShapeError, InputError: not (n, n), not symmetric, not positive definite.
+    """
+    return inertia if isinstance(inertia, sp.MatrixBase) else positive_matrix(inertia, algebra.dim, "inertia")
 
 
 def torsion(algebra: LieAlgebra, table: Sequence[sp.MatrixBase]) -> sp.Expr:
