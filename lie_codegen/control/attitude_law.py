@@ -34,6 +34,7 @@ from lie_codegen.kernel.linear import (
     plus,
     scaled,
 )
+from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
 
 _KINDS = ("p", "pd", "reduced")
 _ATTITUDE = Port("X", (3, 3), description="attitude error: body to reference, R_d' R")
@@ -56,6 +57,7 @@ def attitude_law(
     k_d: Any = None,
     gyroscopic: str = "cancel",
     z: Sequence[Any] = (0, 0, 1),
+    tunable: bool = False,
     name: str | None = None,
 ) -> Kernel:
     """An attitude law of Geyer's paper.
@@ -63,12 +65,14 @@ def attitude_law(
     Args:
         kind: "p", (X) -> (omega, V, V_dot), the law (17); "pd", (X, omega) -> (torque, V, V_dot), the law (18);
             "reduced", (y) -> (omega, V, V_dot), Proposition 22 for a body sensor y = R' z.
-        inertia: [kg m^2], for "pd"; "p" and "reduced" command a velocity and use none of inertia, k_d, gyroscopic:
+        inertia: [kg m^2], for "pd": a number, a diagonal or a matrix; or "input", as any gain: then it is an input of the
+            kernel by that name, (3, 3), behind the others. "p" and "reduced" command a velocity and use none of inertia, k_d, gyroscopic:
             these are checked and ignored there, so that one call serves all kinds.
         k_p: [1/s] for "p" and "reduced", [N m/rad] for "pd".
         k_d: [N m s/rad], for "pd".
         gyroscopic: "cancel", "none" or "double", for "pd".
         z: the inertial direction that the sensor of "reduced" sees, of any length.
+        tunable: inertia and gains are all inputs, whether or not numbers are given.
         name: C identifier: the symbol is so3_<name>; "attitude_" and the kind if None.
 
     Raises:
@@ -80,31 +84,48 @@ def attitude_law(
     if kind not in _KINDS:
         raise InputError(f"attitude law {kind!r} is not known; choose one of {', '.join(_KINDS)}")
     if kind == "pd":
-        if inertia is None or k_d is None:
+        if not tunable and (inertia is None or k_d is None):
             raise InputError("the attitude law 'pd' needs inertia and k_d")
-        law = replace(_proportional_derivative(inertia, k_p, k_d, gyroscopic), name=name or "attitude_pd")
+        parameters = _parameters(inertia, k_p, k_d, tunable)
+        law = replace(_proportional_derivative(parameters, gyroscopic), name=name or "attitude_pd")
         return nan_off_group(law, group("so3"), ("X",))
     if inertia is not None:
-        body_inertia(inertia)
+        _inertia(inertia, False)
     if k_d is not None:
-        positive_number(k_d, "k_d")
+        parameter(Port("k_d", ()), k_d, positive_number)
     gyroscopic_factor(gyroscopic)
-    made = nan_off_group(_proportional(k_p), group("so3"), ("X",)) if kind == "p" else _reduced(k_p, z)
+    gain = parameter(Port("k_p", (), "1/s", description="gain"), k_p, positive_number, tunable=tunable)
+    made = nan_off_group(_proportional(gain), group("so3"), ("X",)) if kind == "p" else _reduced(gain, z)
     return replace(made, name=name or made.name)
 
 
-def _proportional(k_p: Any) -> Kernel:
-    k = positive_number(k_p, "k_p")
+def _inertia(value: Any, tunable: bool) -> Parameter:
+    port = Port("inertia", (3, 3), "kg m^2", description="inertia of the body, symmetric")
+    return parameter(port, value, body_inertia, tunable=tunable)
 
-    def body(ops: Arithmetic, X: Matrix) -> tuple[Any, ...]:
+
+def _parameters(inertia: Any, k_p: Any, k_d: Any, tunable: bool) -> tuple[Parameter, ...]:
+    """Of a law that commands a torque."""
+    stiffness = Port("k_p", (), "N m/rad", description="stiffness")
+    damping = Port("k_d", (), "N m s/rad", description="damping")
+    return (
+        _inertia(inertia, tunable),
+        parameter(stiffness, k_p, positive_number, tunable=tunable),
+        parameter(damping, k_d, positive_number, tunable=tunable),
+    )
+
+
+def _proportional(k_p: Parameter) -> Kernel:
+    def body(ops: Arithmetic, X: Matrix, *given: Any) -> tuple[Any, ...]:
         theta = rotation_log(ops, X)
-        gain, square = number(ops, k), dot(theta, theta)
+        [gain] = values_of(ops, [k_p], given)
+        square = dot(theta, theta)
         return scaled(-gain, theta), square / 2, -gain * square
 
     return Kernel(
         name="attitude_p",
         namespace="so3",
-        inputs=(_ATTITUDE,),
+        inputs=(_ATTITUDE, *input_ports([k_p])),
         outputs=(
             Port("omega", (3,), "rad/s", description="commanded body angular velocity"),
             Port("V", (), "rad^2", description="|theta|^2/2"),
@@ -113,27 +134,26 @@ def _proportional(k_p: Any) -> Kernel:
         body=body,
         formula="omega = -k_p log R; R(t) = exp(e^{-k_p t} log R(0))",
         source="Geyer, The Attitude Control Problem, (17) with omega where omega' is printed",
-        sampler=lambda rng: (_rotation(rng),),
+        sampler=lambda rng: (_rotation(rng), *sample_inputs([k_p], rng)),
     )
 
 
-def _proportional_derivative(inertia: Any, k_p: Any, k_d: Any, gyroscopic: str) -> Kernel:
-    metric = body_inertia(inertia)
-    p, d = positive_number(k_p, "k_p"), positive_number(k_d, "k_d")
+def _proportional_derivative(parameters: Sequence[Parameter], gyroscopic: str) -> Kernel:
     factor = gyroscopic_factor(gyroscopic)
 
-    def body(ops: Arithmetic, X: Matrix, omega: Vector) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, X: Matrix, omega: Vector, *given: Any) -> tuple[Any, ...]:
+        metric, p, d = values_of(ops, parameters, given)
         theta = rotation_log(ops, X)
-        momentum = matvec(constant_matrix(ops, metric), omega)
-        action = plus(scaled(number(ops, p), theta), scaled(number(ops, d), omega))
+        momentum = matvec(metric, omega)
+        action = plus(scaled(p, theta), scaled(d, omega))
         torque = minus(scaled(factor, cross(omega, momentum)), action)
-        V = (number(ops, p) * dot(theta, theta) + dot(omega, momentum)) / 2
-        return torque, V, -number(ops, d) * dot(omega, omega)
+        V = (p * dot(theta, theta) + dot(omega, momentum)) / 2
+        return torque, V, -d * dot(omega, omega)
 
     return Kernel(
         name="attitude_pd",
         namespace="so3",
-        inputs=(_ATTITUDE, _RATE),
+        inputs=(_ATTITUDE, _RATE, *input_ports(parameters)),
         outputs=(
             Port("torque", (3,), "N m", description="body torque tau of I omega' = -omega x I omega + tau"),
             Port("V", (), "J", description="k_p |theta|^2/2 + omega' I omega/2"),
@@ -142,12 +162,15 @@ def _proportional_derivative(inertia: Any, k_p: Any, k_d: Any, gyroscopic: str) 
         body=body,
         formula=f"tau = {factor} omega x I omega - k_p log R - k_d omega",
         source="Geyer, The Attitude Control Problem, (18); the printed sign of omega x I omega goes with the printed (3)",
-        sampler=lambda rng: (_rotation(rng), [rng.uniform(-1, 1) for _ in range(3)]),
+        sampler=lambda rng: (
+            _rotation(rng),
+            [rng.uniform(-1, 1) for _ in range(3)],
+            *sample_inputs(parameters, rng),
+        ),
     )
 
 
-def _reduced(k_p: Any, z: Sequence[Any]) -> Kernel:
-    k = positive_number(k_p, "k_p")
+def _reduced(k_p: Parameter, z: Sequence[Any]) -> Kernel:
     if len(z) != 3:
         raise ShapeError(f"z has {len(z)} entries; give the three of an inertial direction")
     exact = [real_number(entry, f"z[{i}]") for i, entry in enumerate(z)]
@@ -156,12 +179,12 @@ def _reduced(k_p: Any, z: Sequence[Any]) -> Kernel:
         raise InputError("z is zero; give the inertial direction that the sensor sees")
     unit = [entry / length for entry in exact]
 
-    def body(ops: Arithmetic, y: Vector) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, y: Vector, *given: Any) -> tuple[Any, ...]:
         axis = [number(ops, entry) for entry in unit]
         of_unit_length = ops.less(ops.fabs(dot(y, y) - 1), ops.constant(2 * NEAR_GROUP))
         normal, cosine = cross(axis, y), dot(axis, y)
         ratio = _angle_over_sine(ops, dot(normal, normal), cosine)
-        error, gain = scaled(ratio, normal), number(ops, k)
+        error, [gain] = scaled(ratio, normal), values_of(ops, [k_p], given)
         square = dot(error, error)
         values = (scaled(gain, error), square / 2, -gain * square)
         return tuple(kept_where(ops, [of_unit_length], value) for value in values)
@@ -169,7 +192,10 @@ def _reduced(k_p: Any, z: Sequence[Any]) -> Kernel:
     return Kernel(
         name="attitude_reduced",
         namespace="so3",
-        inputs=(Port("y", (3,), description="measured direction R' z in the body frame, of unit length"),),
+        inputs=(
+            Port("y", (3,), description="measured direction R' z in the body frame, of unit length"),
+            *input_ports([k_p]),
+        ),
         outputs=(
             Port("omega", (3,), "rad/s", description="commanded body angular velocity"),
             Port("V", (), "rad^2", description="alpha^2/2, alpha the angle from y to z"),
@@ -178,7 +204,7 @@ def _reduced(k_p: Any, z: Sequence[Any]) -> Kernel:
         body=body,
         formula="omega = k_p alpha (z x y)/|z x y|; alpha(t) = alpha(0) e^{-k_p t}; singular at y = -z alone",
         source="Geyer, The Attitude Control Problem, Proposition 22, for y = R' z",
-        sampler=lambda rng: ([row[2] for row in _rotation(rng)],),
+        sampler=lambda rng: ([row[2] for row in _rotation(rng)], *sample_inputs([k_p], rng)),
     )
 
 

@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.loop_library import loop_library, loop_numbers, several
 from lie_codegen.control.reference_check import check_reference
-from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.reference_motion import Reference
-from lie_codegen.control.second_order_step import ForceBody, check_loop, law_states, second_order_step
+from lie_codegen.control.second_order_step import ForceBody, check_loop, law_parameters, law_states
 from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import packed_size
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords
-from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.mechanics.states import initial_states, split_states
-from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
 
 _MOST_STEPS = 2**21
@@ -68,6 +67,8 @@ def closed_loop(
     t: ArrayLike,
     step: float | None = None,
     tolerance: float = 1e-10,
+    gains: Mapping[str, ArrayLike] | None = None,
+    threads: int = 1,
 ) -> ClosedLoop: ...
 
 
@@ -101,6 +102,8 @@ def closed_loop(
     t: ArrayLike,
     step: float | None = None,
     tolerance: float = 1e-10,
+    gains: Mapping[str, ArrayLike] | None = None,
+    threads: int = 1,
     mpc: Any = None,
     values: Mapping[str, Any] | None = None,
     plant: Any = None,
@@ -117,7 +120,8 @@ def closed_loop(
 
     Args:
         group: any matrix group, its name or its file.
-        inertia: symmetric positive definite.
+        inertia: symmetric positive definite: a number, a diagonal or a matrix, which is compiled in; or (N, n, n), one a loop:
+            then it is an input of one compiled step.
         law: an attitude or tracking law, perhaps with states of its own, zero at the start: inputs behind the usual ones
             (integral) beside outputs that are their rates (integral_dot). None for an uncontrolled body.
         reference: for a tracking law.
@@ -127,6 +131,9 @@ def closed_loop(
         t: (k,) equally spaced times.
         step: integration step [s]; None halves it until two runs agree to the tolerance.
         tolerance: on the entries of X and xi at the times t, for step None.
+        gains: values of the law's numbers that are inputs (`k_p="input"`): name -> a number, or one a loop, (N, *shape). A
+            law's `inertia` is that of the body unless it is given here.
+        threads: over which many loops are shared out.
         mpc: a controller of `lc.mpc`, instead of group, inertia and law: its loop from t[0] to t[-1], a sample an interval;
             returns its LoopRun, or a tuple of them.
         values: with `mpc` alone, as what follows: states and parameters of the problem, by name.
@@ -139,7 +146,9 @@ def closed_loop(
         runs: so many runs, of seeds in turn.
 
     Raises:
-        InputError: an inertia that is not positive definite, a reference that jumps, a law without its reference.
+        InputError: an inertia that is not positive definite, a reference that jumps, a law without its reference or without a
+            number that is an input of it.
+        ShapeError: arrays of different numbers of loops.
         NotOnGroupError: X0 is off the group.
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
@@ -168,24 +177,24 @@ def closed_loop(
     if reference is not None and reference.group != group:
         raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")
     check_loop(law, reference)
-    kernels = [second_order_step(group, inertia, external, law=law)]
-    kernels += [law] if law is not None else []
-    kernels += [reference_kernel(reference)] if reference is not None else []
-    lib = build_kernels(lambda: kernels, namespace=group.name)
+    numbers, each, loops = loop_numbers(group, inertia, law, gains or {})
+    lib = loop_library(group, "input" if "inertia_inverse" in numbers else inertia, law, reference, external)
     if reference is not None:
         check_reference(reference, float(times[0]), float(times[-1]), lib.reference)
     start, many = initial_states(group, X0, xi0)
+    if loops is not None:
+        start, many = several(start, loops), True
     if law is not None:
         own = sum(port.size for port in law_states(law))
         start = np.ascontiguousarray(np.concatenate([start, np.zeros((len(start), own))], axis=1))
     if step is not None:
         count = max(1, int(np.ceil((times[1] - times[0]) / step - 1e-9)))
-        states, error = _run(lib, start, times, count, many), float("nan")
+        states, error = _run(lib, start, times, count, many, numbers, threads), float("nan")
     else:
-        states, count, error = _refined(lib, start, times, many, tolerance, group)
+        states, count, error = _refined(lib, start, times, many, tolerance, group, numbers, threads)
     X, xi = split_states(group, states)
     own_states = states[..., packed_size(group) + group.dim :]
-    outputs, X_d, xi_d = _outputs(lib, law, reference, times, X, xi, own_states, many)
+    outputs, X_d, xi_d = _outputs(lib, law, reference, times, X, xi, own_states, many, each)
     return ClosedLoop(times, X, xi, outputs, X_d, xi_d, count * (len(times) - 1), error)
 
 
@@ -199,7 +208,9 @@ def _times(t: ArrayLike) -> Array:
     return times
 
 
-def _run(lib: Library, start: Array, times: Array, every: int, many: bool) -> Array:
+def _run(
+    lib: Library, start: Array, times: Array, every: int, many: bool, numbers: Mapping[str, Array], threads: int
+) -> Array:
     """(k, N, m) or (k, m) states at the times, `every` steps from one to the next."""
     total = every * (len(times) - 1)
     h = (times[-1] - times[0]) / total
@@ -210,16 +221,18 @@ def _run(lib: Library, start: Array, times: Array, every: int, many: bool) -> Ar
         stages = _stages(lib, times[0] + h * first, h, count)
         clock = times[0] + h * (first + np.arange(count))
         if many:
-            states.append(_advance_all(lib, np.ascontiguousarray(states[-1][-1]), clock, h, stages, every))
+            states.append(
+                _advance_all(lib, np.ascontiguousarray(states[-1][-1]), clock, h, stages, every, numbers, threads)
+            )
         else:
-            run = lib.second_order_step.scan(states[-1][-1], n=count, every=every, t=clock, h=h, **stages)
+            run = lib.second_order_step.scan(states[-1][-1], n=count, every=every, t=clock, h=h, **stages, **numbers)
             states.append(np.asarray(run)[1:])
     return np.concatenate(states)
 
 
 def _stages(lib: Library, start: float, h: float, count: int) -> dict[str, Array]:
     """The reference at the ends and the middle of each step, as the step takes it; nothing for other laws."""
-    names = [port.name for port in lib.second_order_step.inputs[3:]]
+    names = [port.name for port in lib.second_order_step.inputs[3:6] if port.name in ("X_d", "xi_d", "xi_d_dot")]
     if not names:
         return {}
     X, xi, rate = lib.reference.batch(start + h / 2 * np.arange(2 * count + 1))
@@ -230,20 +243,37 @@ def _stages(lib: Library, start: float, h: float, count: int) -> dict[str, Array
     }
 
 
-def _advance_all(lib: Library, current: Array, clock: Array, h: float, stages: dict[str, Array], every: int) -> Array:
+def _advance_all(
+    lib: Library,
+    current: Array,
+    clock: Array,
+    h: float,
+    stages: dict[str, Array],
+    every: int,
+    numbers: Mapping[str, Array],
+    threads: int,
+) -> Array:
     """(count / every, N, m) states of many runs."""
     shared: dict[str, Any] = {name: values[None] for name, values in stages.items()}
-    runs = lib.second_order_step.scan_batch(current, n=len(clock), every=every, t=clock[None], h=h, **shared)
+    step = lib.second_order_step
+    runs = step.scan_batch(current, n=len(clock), every=every, threads=threads, t=clock[None], h=h, **shared, **numbers)
     return np.ascontiguousarray(np.moveaxis(runs[:, 1:], 0, 1))
 
 
 def _refined(
-    lib: Library, start: Array, times: Array, many: bool, tolerance: float, group: MatrixGroup
+    lib: Library,
+    start: Array,
+    times: Array,
+    many: bool,
+    tolerance: float,
+    group: MatrixGroup,
+    numbers: Mapping[str, Array],
+    threads: int,
 ) -> tuple[Array, int, float]:
     every, previous = 1, None
     gap = times[1] - times[0]
     while every * (len(times) - 1) <= _MOST_STEPS:
-        states = _run(lib, start, times, every, many)
+        states = _run(lib, start, times, every, many, numbers, threads)
         speed = np.max(np.abs(states[..., packed_size(group) :])) if np.all(np.isfinite(states)) else np.inf
         if previous is not None and np.isfinite(speed):
             error = float(np.max(np.abs(states - previous))) / 15
@@ -266,6 +296,7 @@ def _outputs(
     xi: Array,
     own_states: Array,
     many: bool,
+    numbers: Mapping[str, Array],
 ) -> tuple[dict[str, Array], Array | None, Array | None]:
     X_d = xi_d = None
     arguments: list[Array] = []
@@ -281,8 +312,14 @@ def _outputs(
     own = (
         dict(zip((port.name for port in ports), np.split(own_states, ends[:-1], axis=-1), strict=True)) if ports else {}
     )
-    parts = [np.ascontiguousarray(z.reshape(-1, z.shape[-1])) for z in own.values()]
-    values = lib[law.name].batch(*flat, *arguments, *parts)
+    parts: dict[str, Any] = {name: np.ascontiguousarray(z.reshape(-1, z.shape[-1])) for name, z in own.items()}
+    tuned: dict[str, Any] = {p.name: _repeated(p, numbers[p.name], len(times)) for p in law_parameters(law)}
+    values = lib[law.name].batch(*flat, *arguments, **parts, **tuned)
     names = [port.name for port in law.outputs]
     given = {key: v.reshape(*shape, *v.shape[1:]) for key, v in zip(names, values, strict=True)}
     return {**given, **own}, X_d, xi_d
+
+
+def _repeated(port: Port, values: Array, times: int) -> Array:
+    """One a sample of all loops at all times, where there is one a loop."""
+    return values if values.ndim == len(port.shape) else np.tile(values, (times, *[1] * len(port.shape)))

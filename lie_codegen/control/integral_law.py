@@ -18,7 +18,7 @@ import sympy as sp
 from lie_codegen.control.error_catalogue import gain
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.tracking_law import as_error, tracking_law
-from lie_codegen.errors import ShapeError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices
@@ -27,6 +27,9 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, matvec, minus, number, plus, scaled
+
+#: Inputs of a tracking law whose numbers are all compiled in.
+_TRACKING = 5
 
 
 @kernel_factory(group=as_group)
@@ -58,6 +61,8 @@ def integral_law(
         key: value for key, value in gains.items() if key not in ("c", "w") and key.replace("_", "").lower() != "ki"
     }
     law = tracking_law(group, inertia=inertia, error=error, gains=rest, feedforward=feedforward, name=name)
+    if len(law.inputs) != _TRACKING:
+        raise InputError('an integral law has its numbers compiled in: inertia and gains cannot be "input"')
     pair = as_error(group, error, rest)
     K_i = positive_matrix(gain(gains, "K_i", "an integral law"), group.dim, "K_i")
     K_d = positive_matrix(gain(gains, "K_d", "an integral law"), group.dim, "K_d")

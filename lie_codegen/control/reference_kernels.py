@@ -147,7 +147,7 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
     ]
 
 
-@record_factory(times=doubles, waypoints=doubles, start=doubles)
+@record_factory(group=as_group, times=doubles, waypoints=doubles, start=doubles)
 def reference(
     group: GroupLike,
     formulas: Sequence[Any] | None = None,

@@ -8,7 +8,8 @@ the end, on the group to rounding for |h xi| <= 1/4. Munthe-Kaas, BIT 38 (1998) 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import sympy as sp
@@ -27,8 +28,9 @@ from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, bracket, matmul, plus, scaled
-from lie_codegen.mechanics.kernels import acceleration_body
+from lie_codegen.kernel.linear import Matrix, Vector, bracket, constant_matrix, matmul, plus, scaled
+from lie_codegen.kernel.parameter import Parameter, parameter
+from lie_codegen.mechanics.kernels import acceleration
 
 #: (ops, t, X, xi) -> (n,) body force.
 ForceBody = Callable[[Arithmetic, Scalar, Any, Vector], Vector]
@@ -66,23 +68,33 @@ def second_order_step(
 
     Args:
         group: any matrix group.
-        inertia: symmetric positive definite.
+        inertia: symmetric positive definite; or "input": then `inertia` and `inertia_inverse`, (n, n), are inputs, so that
+            one library serves every body.
         force: body force beside the law; None for none.
-        law: an attitude or tracking law; None for none.
+        law: an attitude or tracking law; None for none. Parameters of the law that are inputs become inputs of the step;
+            its `inertia` is that of the body if that is an input too.
         name: C identifier.
 
     Raises:
         InputError: the inertia is not symmetric positive definite, or the law has other inputs than those.
     """
-    metric = positive_matrix(inertia, group.dim, "inertia")
+    n = group.dim
+    metric = parameter(Port("inertia", (n, n), description="of the body, symmetric"), inertia, read_inertia(n))
     size, move = packed_size(group), Move(group)
     tracks = law is not None and _tracks(law)
     own = () if law is None else law_states(law)
-    extent = size + group.dim + sum(port.size for port in own)
+    tuned = step_parameters(metric, law)
+    extent = size + n + sum(port.size for port in own)
 
-    def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *reference: Any) -> tuple[Any, ...]:
-        X, xi, z = unpack(group, state[:size]), list(state[size : size + group.dim]), list(state[size + group.dim :])
+    def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *rest: Any) -> tuple[Any, ...]:
+        X, xi, z = unpack(group, state[:size]), list(state[size : size + n]), list(state[size + n :])
+        reference, given = (rest[:3], rest[3:]) if tracks else ((), rest)
         stages = [(_square(group, X_d), xi_d, rate) for X_d, xi_d, rate in zip(*reference, strict=True)]
+        numbers = dict(zip((port.name for port in tuned), given, strict=True))
+        if metric.value is None:
+            body_inertia = numbers["inertia"], numbers["inertia_inverse"]
+        else:
+            body_inertia = constant_matrix(ops, metric.value), constant_matrix(ops, metric.value.inv())
 
         def applied(
             ops: Arithmetic, stage: int, time: Scalar, Y: Any, eta: Vector, zeta: Vector
@@ -90,11 +102,13 @@ def second_order_step(
             total: Vector = [0] * group.dim if force is None else force(ops, time, Y, eta)
             if law is None:
                 return total, []
-            given = law.evaluate(ops, Y, eta, *(stages[stage] if tracks else ()), *_parts(own, zeta))
+            parts = dict(zip((port.name for port in own), _parts(own, zeta), strict=True))
+            behind = [parts[p.name] if p.name in parts else numbers[p.name] for p in _behind(law)]
+            given = law.evaluate(ops, Y, eta, *(stages[stage] if tracks else ()), *behind)
             by_name = dict(zip((port.name for port in law.outputs), given, strict=True))
             return plus(total, given[0]), [x for port in own for x in by_name[f"{port.name}_dot"]]
 
-        Theta, change, drift = increments(ops, move, metric, applied, X, xi, t, h, z)
+        Theta, change, drift = increments(ops, move, body_inertia, applied, X, xi, t, h, z)
         return ([*pack(group, move(ops, X, Theta)), *plus(xi, change), *(plus(z, drift) if z else ())],)
 
     data = WeiNormanData(group)
@@ -107,7 +121,7 @@ def second_order_step(
         state = [*pack(group, random_element(group, data, rng)), *vector(), *rest]
         flat = [[z for row in random_element(group, data, rng) for z in row] for _ in range(3)]
         reference = (flat, [vector() for _ in range(3)], [vector() for _ in range(3)]) if tracks else ()
-        return state, rng.uniform(0, 1), rng.uniform(0, 0.05), *reference
+        return state, rng.uniform(0, 1), rng.uniform(0, 0.05), *reference, *(_sample(port, rng) for port in tuned)
 
     return Kernel(
         name=name,
@@ -119,6 +133,7 @@ def second_order_step(
             Port("t", (), "s"),
             Port("h", (), "s"),
             *(_reference_ports(group) if tracks else ()),
+            *tuned,
         ),
         outputs=(Port("state_next", (extent,)),),
         body=body,
@@ -132,25 +147,70 @@ def _tracks(law: Kernel) -> bool:
     """Whether the law takes a reference.
 
     Raises:
-        InputError: its inputs are neither (X, omega) nor (X, xi, X_d, xi_d, xi_d_dot), with states of its own behind.
+        InputError: its inputs are neither (X, omega) nor (X, xi, X_d, xi_d, xi_d_dot), with states and parameters of its own
+            behind.
     """
     names = tuple(port.name for port in law.inputs)
-    results = {port.name: port.shape for port in law.outputs}
     for known in (_TRACKING, _ATTITUDE):
-        own = law.inputs[len(known) :]
-        if names[: len(known)] == known and all(
-            len(port.shape) == 1 and results.get(f"{port.name}_dot") == port.shape for port in own
-        ):
+        behind = law.inputs[len(known) :]
+        if names[: len(known)] == known and all(_is_state(law, p) or _is_parameter(law, p) for p in behind):
             return known is _TRACKING
     raise InputError(
         f"the law {law.name} has the inputs {', '.join(names)}; a closed loop needs {', '.join(_ATTITUDE)} or "
-        f"{', '.join(_TRACKING)}, and behind them only states of the law: vectors z with an output z_dot of their size"
+        f"{', '.join(_TRACKING)}, and behind them only states of the law (vectors z with an output z_dot of their size) and "
+        'parameters that are inputs ("input")'
     )
+
+
+def _is_state(law: Kernel, port: Port) -> bool:
+    results = {each.name: each.shape for each in law.outputs}
+    return len(port.shape) == 1 and results.get(f"{port.name}_dot") == port.shape
+
+
+def _is_parameter(law: Kernel, port: Port) -> bool:
+    """By what the law is defined by: a number of that name, there or among its gains."""
+    given = {} if law.definition is None else law.definition["parameters"]
+    nested = [value for value in given.values() if isinstance(value, Mapping)]
+    names = {_letters(key) for each in (given, *nested, *(n.get("parameters", {}) for n in nested)) for key in each}
+    return _letters(port.name) in names
+
+
+def _letters(name: str) -> str:
+    """K_d, Kd and k_d are one gain."""
+    return name.replace("_", "").lower()
+
+
+def _behind(law: Kernel) -> tuple[Port, ...]:
+    """The inputs behind the usual ones."""
+    return law.inputs[len(_TRACKING if _tracks(law) else _ATTITUDE) :]
 
 
 def law_states(law: Kernel) -> tuple[Port, ...]:
     """The states of the law itself, as the integral of `integral_law`; all zero at the start."""
-    return law.inputs[len(_TRACKING if _tracks(law) else _ATTITUDE) :]
+    return tuple(port for port in _behind(law) if _is_state(law, port))
+
+
+def law_parameters(law: Kernel) -> tuple[Port, ...]:
+    """The numbers of the law that are inputs."""
+    return tuple(port for port in _behind(law) if not _is_state(law, port))
+
+
+def step_parameters(metric: Parameter, law: Kernel | None) -> tuple[Port, ...]:
+    """The numbers that are inputs of the step: the inertia with its inverse, and those of the law."""
+    inertia = (metric.port, replace(metric.port, name="inertia_inverse")) if metric.value is None else ()
+    known = {port.name for port in inertia}
+    return (*inertia, *(port for port in (law_parameters(law) if law is not None else ()) if port.name not in known))
+
+
+def read_inertia(size: int) -> Callable[[Any, str], sp.ImmutableMatrix]:
+    """(value, name) -> an exact symmetric positive definite matrix."""
+    return lambda value, name: positive_matrix(value, size, name)
+
+
+def _sample(port: Port, rng: random.Random) -> Any:
+    if not port.shape:
+        return rng.uniform(0.5, 2)
+    return [[float(i == j) for j in range(port.shape[1])] for i in range(port.shape[0])]
 
 
 def _parts(ports: Sequence[Port], flat: Vector) -> list[Vector]:
@@ -187,7 +247,8 @@ def held_force_step(group: MatrixGroup, inertia: Any, name: str = "held_force_st
 
     def body(ops: Arithmetic, state: Vector, force: Vector, h: Scalar) -> tuple[Any, ...]:
         X, xi = unpack(group, state[:size]), list(state[size:])
-        Theta, change, _ = increments(ops, move, metric, lambda *_: (list(force), []), X, xi, 0, h)
+        inertia = constant_matrix(ops, metric), constant_matrix(ops, metric.inv())
+        Theta, change, _ = increments(ops, move, inertia, lambda *_: (list(force), []), X, xi, 0, h)
         return ([*pack(group, move(ops, X, Theta)), *plus(xi, change)],)
 
     data = WeiNormanData(group)
@@ -229,7 +290,7 @@ class Move:
 def increments(
     ops: Arithmetic,
     move: Move,
-    inertia: sp.MatrixBase,
+    inertia: tuple[Matrix, Matrix],
     force: StageForce,
     X: Any,
     xi: Vector,
@@ -243,7 +304,7 @@ def increments(
     def rates(stage: int, Y: Any, eta: Vector, zeta: Vector) -> tuple[Vector, Vector]:
         time = (t, t + h / 2, t + h)[stage]
         applied, drift = force(ops, stage, time, Y, eta, zeta)
-        return acceleration_body(ops, group, inertia, eta, applied), drift
+        return acceleration(ops, group, *inertia, eta, applied), drift
 
     def pulled(theta: Vector, eta: Vector) -> Vector:
         """Theta' = eta + [Theta, eta]/2 + [Theta, [Theta, eta]]/12, signs for X' = X hat(xi)."""

@@ -38,10 +38,10 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
+    Matrix,
     Vector,
     ad_star,
     bracket,
-    constant_matrix,
     dot,
     matvec,
     minus,
@@ -49,6 +49,7 @@ from lie_codegen.kernel.linear import (
     plus,
     scaled,
 )
+from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
 
 #: The feedforwards by name.
 FEEDFORWARDS = ("basic", "right", "left", "levi_civita")
@@ -62,18 +63,21 @@ def tracking_law(
     error: Any,
     gains: Mapping[str, Any] | None = None,
     feedforward: str = "basic",
+    tunable: bool = False,
     name: str = "tracking_law",
 ) -> Kernel:
     """The tracking law as a kernel (X, xi, X_d, xi_d, xi_d_dot) -> (force, phi, W, W_dot).
 
     Args:
         group: any matrix group.
-        inertia: symmetric positive definite on the algebra: a number, a diagonal or an (n, n) matrix.
+        inertia: symmetric positive definite on the algebra: a number, a diagonal or an (n, n) matrix; or "input": then it is an
+            input of the kernel by that name, (n, n), behind the others. So may K_d be.
         error: a name ("so3_right", "so3_left", "se3_1" .. "se3_6", "frobenius"), an `ErrorFunction`, or (phi,
         transport)
             as `error_function` takes them, with the parameters among the gains.
         gains: K_d (dissipation) and what the error function needs: K_p, or K_1 and K_2, or its parameters.
         feedforward: "basic", "right", "left" or "levi_civita".
+        tunable: inertia and K_d are inputs, whether or not numbers are given; the error function is compiled in.
         name: C identifier of the kernel.
 
     Raises:
@@ -87,20 +91,35 @@ def tracking_law(
         raise InputError(f"gains must be a mapping such as {{'K_p': 4, 'K_d': 6}}, got {gains!r}")
     gains = gains or {}
     pair = as_error(group, error, gains)
-    metric = _inertia(group, inertia)
-    K_d = positive_matrix(gain(gains, "K_d", "a tracking law"), group.dim, "K_d")
+    shape, K_d = (group.dim, group.dim), gain(gains, "K_d", "a tracking law")
+    parameters = (
+        parameter(
+            Port("inertia", shape, description="of the body, symmetric"),
+            inertia,
+            lambda value, _: _inertia(group, value),
+            tunable=tunable,
+        ),
+        parameter(
+            Port("K_d", shape, description="dissipation, symmetric"),
+            K_d,
+            lambda value, name: positive_matrix(value, group.dim, name),
+            tunable=tunable,
+        ),
+    )
     check_compatibility(pair)
     real, data = RealMatrices(group), WeiNormanData(group)
 
-    def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any, *given: Any) -> tuple[Any, ...]:
         read = GroupMatrices(ops, real).read
+        metric, K_d = values_of(ops, parameters, given)
         return _law(ops, pair, real, metric, K_d, feedforward, read(X), xi, read(X_d), xi_d, xi_d_dot)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         def vector() -> list[float]:
             return [rng.uniform(-1, 1) for _ in range(group.dim)]
 
-        return (random_element(group, data, rng), vector(), random_element(group, data, rng), vector(), vector())
+        X, X_d = random_element(group, data, rng), random_element(group, data, rng)
+        return X, vector(), X_d, vector(), vector(), *sample_inputs(parameters, rng)
 
     n, speed = group.dim, velocity_units(group)
     law = Kernel(
@@ -112,6 +131,7 @@ def tracking_law(
             matrix_port(group, "X_d", "reference configuration"),
             Port("xi_d", (n,), speed, description="reference velocity in the frame of the reference"),
             Port("xi_d_dot", (n,), velocity_units(group, "s^2"), description="its rate of change"),
+            *input_ports(parameters),
         ),
         outputs=(
             Port("force", (n,), force_units(group), description="body force f of I xi' = ad*_xi I xi + f"),
@@ -156,8 +176,8 @@ def _law(
     ops: Arithmetic,
     pair: ErrorFunction,
     real: RealMatrices,
-    inertia: sp.ImmutableMatrix,
-    dissipation: sp.ImmutableMatrix,
+    metric: Matrix,
+    dissipation: Matrix,
     feedforward: str,
     X: Any,
     xi: Sequence[Scalar],
@@ -168,10 +188,9 @@ def _law(
     at = ErrorDerivatives(ops, pair, real, X, X_d)
     phi, slope = at.differential(1)
     nu, nu_dot, turned = at.transported_rates(xi, xi_d, xi_d_dot)
-    metric = constant_matrix(ops, inertia)
     xi_e = minus(xi, nu)
-    damping = matvec(constant_matrix(ops, dissipation), xi_e)
-    forward = _feedforward(ops, real, inertia, feedforward, xi, nu, nu_dot, turned)
+    damping = matvec(dissipation, xi_e)
+    forward = _feedforward(ops, real, metric, feedforward, xi, nu, nu_dot, turned)
     force = plus(negative(slope), negative(damping), forward)
     energy = phi + dot(matvec(metric, xi_e), xi_e) / 2
     return force, phi, energy, -dot(damping, xi_e)
@@ -180,7 +199,7 @@ def _law(
 def _feedforward(
     ops: Arithmetic,
     real: RealMatrices,
-    inertia: sp.ImmutableMatrix,
+    metric: Matrix,
     kind: str,
     xi: Sequence[Scalar],
     nu: Vector,
@@ -188,20 +207,18 @@ def _feedforward(
     turned: Vector,
 ) -> Vector:
     algebra = real.group.algebra
-    metric = constant_matrix(ops, inertia)
     if kind == "right":
         return minus(matvec(metric, turned), ad_star(ops, algebra, xi, matvec(metric, nu)))
     if kind == "levi_civita":
-        return plus(matvec(metric, nu_dot), lowered_connection(ops, real, inertia, xi, nu))
+        return plus(matvec(metric, nu_dot), lowered_connection(ops, real, metric, xi, nu))
     return minus(matvec(metric, nu_dot), ad_star(ops, algebra, nu, matvec(metric, xi)))
 
 
 def lowered_connection(
-    ops: Arithmetic, real: RealMatrices, inertia: sp.ImmutableMatrix, x: Sequence[Scalar], y: Sequence[Scalar]
+    ops: Arithmetic, real: RealMatrices, metric: Matrix, x: Sequence[Scalar], y: Sequence[Scalar]
 ) -> Vector:
     """I nabla_x y = I [x, y]/2 - (ad*_x I y + ad*_y I x)/2, (8); no inverse of I is needed."""
     algebra = real.group.algebra
-    metric = constant_matrix(ops, inertia)
     half = ops.constant(sp.Rational(1, 2))
     symmetric = plus(ad_star(ops, algebra, x, matvec(metric, y)), ad_star(ops, algebra, y, matvec(metric, x)))
     return scaled(half, minus(matvec(metric, bracket(ops, algebra, x, y)), symmetric))

@@ -42,7 +42,7 @@ class Definition(dict[str, Any]):
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(self.text)
 
-    @property
+    @functools.cached_property
     def text(self) -> str:
         """Canonical JSON: equal definitions have equal texts."""
         return json.dumps(self, sort_keys=True, separators=(",", ":"))

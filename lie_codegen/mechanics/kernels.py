@@ -18,15 +18,22 @@ from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, ad_star, constant_matrix, dot, matvec, plus
+from lie_codegen.kernel.linear import Matrix, Vector, ad_star, constant_matrix, dot, matvec, plus
 
 
 def acceleration_body(
     ops: Arithmetic, group: MatrixGroup, inertia: sp.MatrixBase, xi: Sequence[Scalar], force: Sequence[Scalar]
 ) -> Vector:
     """I^{-1}(ad*_xi I xi + f)."""
-    momentum = matvec(constant_matrix(ops, inertia), xi)
-    return matvec(constant_matrix(ops, inertia.inv()), plus(ad_star(ops, group.algebra, xi, momentum), force))
+    return acceleration(ops, group, constant_matrix(ops, inertia), constant_matrix(ops, inertia.inv()), xi, force)
+
+
+def acceleration(
+    ops: Arithmetic, group: MatrixGroup, metric: Matrix, inverse: Matrix, xi: Sequence[Scalar], force: Sequence[Scalar]
+) -> Vector:
+    """The same from the scalars of I and of I^{-1}."""
+    momentum = matvec(metric, xi)
+    return matvec(inverse, plus(ad_star(ops, group.algebra, xi, momentum), force))
 
 
 @kernel_factory(group=as_group)

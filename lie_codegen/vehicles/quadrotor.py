@@ -34,7 +34,6 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
     Matrix,
     Vector,
-    constant_matrix,
     cross,
     dot,
     matmul,
@@ -45,6 +44,7 @@ from lie_codegen.kernel.linear import (
     scaled,
     transpose,
 )
+from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
 
 #: Standard gravity [m/s^2].
 GRAVITY = sp.Rational("9.80665")
@@ -54,7 +54,13 @@ _REFERENCE = ("x_d", "v_d", "a_d", "j_d", "s_d", "b_1d", "b_1d_dot", "b_1d_ddot"
 
 @kernel_factory(units={"mass": "kg", "inertia": "kg m^2", "gravity": "m/s^2"})
 def quadrotor_law(
-    *, mass: Any, inertia: Any, gains: Mapping[str, Any], gravity: Any = GRAVITY, name: str = "quadrotor_law"
+    *,
+    mass: Any,
+    inertia: Any,
+    gains: Mapping[str, Any],
+    gravity: Any = GRAVITY,
+    tunable: bool = False,
+    name: str = "quadrotor_law",
 ) -> Kernel:
     """The law as a kernel (X, xi, x_d, v_d, a_d, j_d, s_d, b_1d, b_1d_dot, b_1d_ddot) -> (thrust, moment, Psi, rate).
 
@@ -64,20 +70,27 @@ def quadrotor_law(
         mass: [kg].
         inertia: (3, 3) [kg m^2].
         gains: k_x [N/m], k_v [N s/m], k_R [N m], k_W [N m s].
-        gravity: [m/s^2].
+        gravity: [m/s^2]. Each of these numbers may be "input": an input of that name, behind the others.
+        tunable: all of them are inputs.
         name: C identifier.
 
     Raises:
         InputError: an indefinite inertia, a gain that is missing, unknown or not positive.
     """
-    m, g = positive_number(mass, "mass"), positive_number(gravity, "gravity")
-    J = body_inertia(inertia)
     if sorted(gains) != sorted(_GAINS):
         raise InputError(f"a quadrotor law needs the gains {', '.join(_GAINS)}; given: {', '.join(gains)}")
-    k = {key: positive_number(value, key) for key, value in gains.items()}
+    units = {"k_x": "N/m", "k_v": "N s/m", "k_R": "N m", "k_W": "N m s"}
+    parameters = (
+        parameter(Port("mass", (), "kg"), mass, positive_number, tunable=tunable),
+        parameter(Port("gravity", (), "m/s^2"), gravity, positive_number, tunable=tunable),
+        parameter(Port("inertia", (3, 3), "kg m^2"), inertia, body_inertia, tunable=tunable),
+        *(parameter(Port(key, (), units[key]), gains[key], positive_number, tunable=tunable) for key in _GAINS),
+    )
+    count = len(_REFERENCE)
 
-    def body(ops: Arithmetic, X: Matrix, xi: Vector, *reference: Vector) -> tuple[Any, ...]:
-        return _law(ops, number(ops, m), number(ops, g), J, {a: number(ops, b) for a, b in k.items()}, X, xi, reference)
+    def body(ops: Arithmetic, X: Matrix, xi: Vector, *rest: Any) -> tuple[Any, ...]:
+        m, g, J, *k = values_of(ops, parameters, rest[count:])
+        return _law(ops, m, g, J, dict(zip(_GAINS, k, strict=True)), X, xi, rest[:count])
 
     return Kernel(
         name=name,
@@ -93,6 +106,7 @@ def quadrotor_law(
             Port("b_1d", (3,), "", description="direction in which the first body axis should point"),
             Port("b_1d_dot", (3,), "1/s"),
             Port("b_1d_ddot", (3,), "1/s^2"),
+            *input_ports(parameters),
         ),
         outputs=(
             Port("thrust", (), "N", description="f, along -R e_3"),
@@ -103,7 +117,7 @@ def quadrotor_law(
         body=body,
         formula="f = -A.R e_3, M = -k_R e_R - k_W e_W + Omega x J Omega - J (Omega^ R'R_c Omega_c - R'R_c Omega_c')",
         source="the law of Lee, Leok and McClamroch (2010); derivation in the module",
-        sampler=_sample,
+        sampler=lambda rng: (*_sample(rng), *sample_inputs(parameters, rng)),
     )
 
 
@@ -154,7 +168,7 @@ def _law(
     ops: Arithmetic,
     m: Scalar,
     g: Scalar,
-    inertia: sp.MatrixBase,
+    inertia: Matrix,
     k: Mapping[str, Scalar],
     X: Matrix,
     xi: Vector,
@@ -175,7 +189,7 @@ def _law(
     gap_1 = minus(plus(scaled(-thrust_1 / m, axis), scaled(-thrust / m, spin)), j_d)
     A_2 = plus(scaled(-k["k_x"], gap), scaled(-k["k_v"], gap_1), scaled(m, s_d))
     R_c, W_c, W_c_dot = _commanded(ops, (A, A_1, A_2), heading)
-    J = constant_matrix(ops, inertia)
+    J = inertia
     turn = matmul(transpose(R), R_c)  # R' R_c
     e_R = scaled(ops.constant(sp.Rational(1, 2)), _vee_difference(transpose(turn)))
     rate = matvec(turn, W_c)

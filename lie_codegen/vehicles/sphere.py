@@ -11,11 +11,12 @@ from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, dot, minus, number, plus, scaled
+from lie_codegen.kernel.linear import Vector, dot, minus, plus, scaled
+from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
 
 
 @kernel_factory(units={"k_p": "1/s^2", "k_d": "1/s"})
-def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, name: str = "sphere_law") -> Kernel:
+def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, tunable: bool = False, name: str = "sphere_law") -> Kernel:
     """Tracking for nabla_{q'} q' = F on S^n: (q, q_dot, r, r_dot, r_ddot) -> (force, phi, W, W_dot).
 
     F = k_p pi_q r - k_d (q' - T r') + pi_q d/dt(T r'),  T r' = (q.r) r' - (q.r') r,  W = k_p (1 - q.r) + |q' - T
@@ -23,8 +24,9 @@ def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, name: str = "sphere_law") -> K
 
     Args:
         n: dimension of the sphere; vectors have n + 1 entries.
-        k_p: [1/s^2].
-        k_d: [1/s].
+        k_p: [1/s^2]; a number, or "input" for an input of that name.
+        k_d: [1/s]; likewise.
+        tunable: both are inputs.
         name: C identifier.
 
     Raises:
@@ -32,10 +34,14 @@ def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, name: str = "sphere_law") -> K
     """
     if isinstance(n, bool) or not isinstance(n, int) or n < 1:
         raise InputError(f"a sphere has dimension 1, 2, ..., not {n!r}")
-    p, d = positive_number(k_p, "k_p"), positive_number(k_d, "k_d")
+    gains = (
+        parameter(Port("k_p", (), "1/s^2", description="stiffness"), k_p, positive_number, tunable=tunable),
+        parameter(Port("k_d", (), "1/s", description="damping"), k_d, positive_number, tunable=tunable),
+    )
 
-    def body(ops: Arithmetic, q: Vector, v: Vector, r: Vector, w: Vector, a: Vector) -> tuple[Any, ...]:
-        return _law(ops, number(ops, p), number(ops, d), q, v, r, w, a)
+    def body(ops: Arithmetic, q: Vector, v: Vector, r: Vector, w: Vector, a: Vector, *given: Any) -> tuple[Any, ...]:
+        p, d = values_of(ops, gains, given)
+        return _law(ops, p, d, q, v, r, w, a)
 
     size = n + 1
     return Kernel(
@@ -49,6 +55,7 @@ def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, name: str = "sphere_law") -> K
             Port(
                 "r_ddot", (size,), "1/s^2", description="second derivative in R^{n+1}; its part along r does not matter"
             ),
+            *input_ports(gains),
         ),
         outputs=(
             Port("force", (size,), "1/s^2", description="tangent force F of nabla_q' q' = F"),
@@ -59,7 +66,7 @@ def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, name: str = "sphere_law") -> K
         body=body,
         formula="F = k_p pi_q r - k_d (q' - T r') + pi_q d/dt(T r'), T r' = (q.r) r' - (q.r') r",
         source="Bullo and Murray, CIT-CDS 97-003, Lemma 5.1, with T r' = (r x r') x q",
-        sampler=lambda rng: _sample(rng, size),
+        sampler=lambda rng: (*_sample(rng, size), *sample_inputs(gains, rng)),
     )
 
 

@@ -19,7 +19,7 @@ from lie_codegen.codegen.package import render_library, render_package
 from lie_codegen.codegen.templates import environment, template_folder
 from lie_codegen.codegen.views import PackageMetadata, comment_lines
 from lie_codegen.codegen.write import write_package
-from lie_codegen.errors import CodegenError, OutputFolderError
+from lie_codegen.errors import CodegenError, IdentifierError, OutputFolderError
 from lie_codegen.kernel.kernel import Kernel, Port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -266,6 +266,10 @@ def test_colliding_symbols_are_refused_and_namespaces_told_apart() -> None:
         render_library("toy", [kernel("a"), kernel("a")])
     both = render_library("toy", [kernel("a"), kernel("a", "other")])
     assert [each.name for each in both.signatures] == ["toy_a", "other_a"]
+    with pytest.raises(CodegenError, match="no kernel"):
+        render_library("toy", [])
+    with pytest.raises(IdentifierError):
+        render_library("not-c", [kernel("a")])
 
 
 def test_a_sampler_outside_the_domain_is_named() -> None:
