@@ -7,9 +7,15 @@ lie_codegen/control/__init__.pyi; `lc.attitude_law` follows from it by this scri
 from __future__ import annotations
 
 import ast
+import inspect
+import sys
+from importlib import import_module
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / "lie_codegen"
+
+#: Names and parameters of the door that users have; `--freeze` adds those of today.
+FROZEN = Path(__file__).with_name("front_door.txt")
 
 HEADING = '''"""The front door, indexed by subject: `lc.NAME` for every public name.
 
@@ -43,5 +49,26 @@ def flat_stub() -> str:
     return f"{HEADING}{packages}{indexed}"
 
 
+def frozen() -> dict[str, set[str]]:
+    """Names that may not be lost, each with its parameters."""
+    lines = FROZEN.read_text(encoding="utf-8").splitlines() if FROZEN.is_file() else []
+    return {name: set(parameters.split()) for name, _, parameters in (line.partition(":") for line in lines)}
+
+
+def present() -> dict[str, set[str]]:
+    """Names that there are, each with its parameters."""
+    values = {name: getattr(import_module("lie_codegen"), name) for subject in subjects() for name in names(subject)}
+    return {name: set(inspect.signature(value).parameters) - {"unknown"} for name, value in values.items()}
+
+
+def freeze() -> None:
+    """Add what there is to what may not be lost."""
+    kept, found = frozen(), present()
+    both = {name: kept.get(name, set()) | found.get(name, set()) for name in sorted({*kept, *found})}
+    FROZEN.write_text("".join(f"{name}: {' '.join(sorted(each))}\n" for name, each in both.items()), encoding="utf-8")
+
+
 if __name__ == "__main__":
     (PACKAGE / "__init__.pyi").write_text(flat_stub(), encoding="utf-8")
+    if "--freeze" in sys.argv:
+        freeze()
