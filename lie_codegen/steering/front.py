@@ -94,6 +94,7 @@ def steer(
             "direct": bounds, drift, goal sets, fuel, functions of time: reaches from many starts, then descends;
             "four_phase": closed form, section 5.2 of TR 93-59; two controls; form="single" for its single-exponential design (66);
             "swing_twist": a constant swing, then a circle, exact; two controls on SO(3), SU(2);
+            "sinusoids": a line and one sinusoid a bracket, exact; chained systems (h3, engel ...);
             "circle": two controls that turn at a constant rate, the least energy within the area rule, retuned; three dimensions;
             "area_rule": Fourier controls of least energy within the averaged model, then retuned to hit the target exactly;
             "loops": a straight part, a loop for each bracket, a figure of eight for each bracket of brackets, in turn, retuned;

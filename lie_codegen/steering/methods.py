@@ -10,6 +10,7 @@ from lie_codegen.steering.closed_form.area_rule import area_rule
 from lie_codegen.steering.closed_form.circle import circle
 from lie_codegen.steering.closed_form.four_phase import four_phase
 from lie_codegen.steering.closed_form.loops import loops
+from lie_codegen.steering.closed_form.sinusoids import sinusoids
 from lie_codegen.steering.closed_form.swing_twist import swing_twist
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
@@ -22,6 +23,7 @@ OPEN_LOOP: Mapping[str, Method] = {
     "four_phase": four_phase,
     "circle": circle,
     "swing_twist": swing_twist,
+    "sinusoids": sinusoids,
     "area_rule": area_rule,
     "loops": loops,
     "optimal": optimal,
