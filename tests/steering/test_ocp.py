@@ -371,6 +371,9 @@ BASE = {"controls": SO3.labels, "duration": 1.0, "intervals": 5, "stage_cost": "
         ({"velocity": "u"}, InputError, "velocity"),
         ({"constraints": ("u1 <= nope",)}, ExpressionError, "nope"),
         ({"parameters": {"u1": ()}}, InputError, "u1"),
+        ({"stage_cost": 3}, InputError, "expected a text"),
+        ({"constraints": (None,)}, InputError, "expected a text"),
+        ({"bounds": "wide"}, ShapeError, "bounds"),
     ],
 )
 def test_what_cannot_be_a_problem_is_refused_by_name(change: dict[str, Any], error: type[Exception], said: str) -> None:
@@ -418,6 +421,10 @@ def test_bad_values_are_refused_by_name() -> None:
         problem.solve(np.eye(3), q=1.0, guess=np.zeros((3, 3)))
     with pytest.raises(InputError, match="starts"):
         problem.solve(np.eye(3), q=1.0, starts=0)
+    with pytest.raises(InputError, match="tolerance"):
+        problem.solve(np.eye(3), q=1.0, tolerance=-1.0)
+    with pytest.raises(InputError, match="iterations"):
+        problem.solve(np.eye(3), q=1.0, iterations=0)
     with pytest.raises(InputError, match="no parameter 'p'"):
         problem.solve(np.eye(3), q=1.0).sensitivity("p")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -305,7 +305,20 @@ def _broadcast(value: Any, shape: Shape, label: str, where: str) -> Array:
 
 
 def _sequence(terms: Any) -> tuple[Any, ...]:
-    return (terms,) if isinstance(terms, str | Kernel) else tuple(terms)
+    """Terms as a tuple; numbers are texts too.
+
+    Raises:
+        InputError: something that is neither a text, a number nor a Kernel.
+    """
+    if isinstance(terms, str | Kernel):
+        return (terms,)
+    if not isinstance(terms, Iterable) or isinstance(terms, Mapping):
+        raise InputError(f"ocp: expected a text, a Kernel or a sequence of them, got {terms!r:.60}")
+    listed = tuple(repr(float(term)) if isinstance(term, int | float) else term for term in terms)
+    for term in listed:
+        if not isinstance(term, str | Kernel):
+            raise InputError(f"ocp: expected a text or a Kernel, got {term!r:.60}")
+    return listed
 
 
 def _listed(names: Any) -> str:

@@ -108,6 +108,11 @@ class OptimalControlProblem:
         """
         where = f"{self.data.name}.solve"
         count = _at_least_one(starts, "starts", where)
+        _at_least_one(iterations, "iterations", where)
+        _at_least_one(1 if threads is None else threads, "threads", where)
+        for what, value in (("tolerance", tolerance), ("allowed", allowed)):
+            if not (isinstance(value, int | float | np.number) and 0 <= value < np.inf):
+                raise InputError(f"{where}: {what} must be a number of at least 0, got {value!r}")
         free = self.data.free_duration
         search = _Search(count, seed, threads, tolerance, allowed, iterations, curvature)
         if free is None:
