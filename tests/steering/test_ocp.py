@@ -278,6 +278,10 @@ def test_a_plan_of_steer_is_a_guess() -> None:
     assert plan.status is Status.SOLVED
     assert 2 * plan.cost == pytest.approx(steered.cost, rel=2e-3)  # steer's cost is int |u|^2
     assert problem.solve(Xd=Xd, starts=8).cost >= plan.cost * (1 - 1e-6)
+    area = lc.steer(SO3, Xd, controls=("w1", "w2"), duration=2.0, method="area_rule")
+    several = problem.solve(Xd=Xd, guess=[None, steered, area, plan], starts=5)
+    assert several.starts.shape == (5, 2)
+    assert several.cost == pytest.approx(plan.cost, rel=1e-8)
 
 
 @pytest.mark.parametrize("make", [regulator, car, satellite], ids=["regulator", "car", "satellite"])

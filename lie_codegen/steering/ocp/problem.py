@@ -91,7 +91,8 @@ class OptimalControlProblem:
         Args:
             X0: (d, d) first element of the group, or (n,) coordinates of the second kind; the identity if not given.
             guess: a plan of this problem (its multipliers are taken over), (N, m) or (m,) controls, or a plan of
-                `lc.steer`; controls that cost least at the first state if not given.
+                `lc.steer`; controls that cost least at the first state if not given. Or a list of plans (None among them for
+                those controls), each of which is a start: closed forms, extremals, direct plans.
             starts: first guesses: the guess, and it with seeded normal perturbations. One start finds one local minimum;
                 where none is admissible eight more are tried.
             seed: of the perturbations: the same seed gives the same plan.
@@ -130,21 +131,25 @@ class OptimalControlProblem:
 
     def _search(self, x0: Array, rows: Array, guess: Any, search: _Search, where: str) -> OptimalPlan:
         """The best of several starts."""
-        first = self._guess(guess, where)
+        guesses = _several(guess)
+        firsts = [self._guess(each, where) for each in guesses]
+        count = max(search.starts, len(guesses))
         machine = self.machine(second_order=search.curvature)
         began = time.perf_counter()
 
         def run(number: int) -> Array:
-            space = self._workspace(machine, x0, rows, first, guess, number, search)
+            which = number % len(guesses)
+            noise = number >= len(guesses)
+            space = self._workspace(machine, x0, rows, firsts[which], guesses[which], number if noise else 0, search)
             machine.solve(space, rows, 0.0, search.tolerance, search.allowed, _OUTER, search.iterations)
             return space
 
         lanes = search.threads if search.threads is not None else os.cpu_count() or 1
-        spaces = _in_lanes(run, range(search.starts), lanes if machine.compiled else 1)
+        spaces = _in_lanes(run, range(count), lanes if machine.compiled else 1)
         best = min(spaces, key=_rank)
         if _rank(best)[0] > 0:
             # one start may be caught in a corner between conditions: others are tried before it is said that none was found
-            spaces += _in_lanes(run, range(search.starts, search.starts + _MORE), lanes if machine.compiled else 1)
+            spaces += _in_lanes(run, range(count, count + _MORE), lanes if machine.compiled else 1)
             best = min(spaces, key=_rank)
         if int(best["status"][0]) < 3:
             kept = best.copy()
@@ -265,6 +270,13 @@ class OptimalControlProblem:
         if row < 0 or not violation > 0:
             return None
         return machine.row_names[row], stage
+
+
+def _several(guess: Any) -> list[Any]:
+    """The guesses of a list of plans (None among them for the one that the solver makes), or the one there is."""
+    if isinstance(guess, list | tuple) and any(each is None or callable(getattr(each, "u", None)) for each in guess):
+        return list(guess)
+    return [guess]
 
 
 def _in_lanes(run: Callable[[int], Array], numbers: Iterable[int], lanes: int) -> list[Array]:
