@@ -13,7 +13,8 @@ from scipy.linalg import expm
 
 from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.steering_cases import INTERVALS, Case, Problem, Solver
-from lie_codegen.flow.metric import distance, element_coordinates
+from lie_codegen.flow.logarithm import distance
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.groups.build import build
 from lie_codegen.groups.matrix_group import MatrixGroup
 

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from lie_codegen.benchmarks.steering_cases import INTERVALS, Case, Problem, Solver
-from lie_codegen.flow.metric import distance, element_coordinates
+from lie_codegen.flow.logarithm import distance
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 _NEAR = 1e-3

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from lie_codegen.benchmarks.steering_cases import INTERVALS, Case, Problem, Solver
-from lie_codegen.flow.metric import distance, element_coordinates
+from lie_codegen.flow.logarithm import distance
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 
 _NEAR = 1e-3
 

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from lie_codegen.benchmarks.steering_cases import INTERVALS, Case, Problem, Solver
 from lie_codegen.benchmarks.steering_opti import rk4_step
-from lie_codegen.flow.metric import element_coordinates
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 
 _REACHED = 1e-5
 

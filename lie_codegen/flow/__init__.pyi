@@ -1,7 +1,7 @@
 """Motion on a group: steps, simulation, charts that restart."""
 
 from .events import Event as Event
-from .metric import distance as distance
-from .metric import second_kind as second_kind
+from .logarithm import distance as distance
+from .second_kind_coordinates import second_kind as second_kind
 from .simulate import simulate as simulate
 from .trajectory import Trajectory as Trajectory

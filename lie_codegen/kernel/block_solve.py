@@ -8,11 +8,11 @@ singular only where the block is: no spurious pivots (shared by design with the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from sympy.utilities.iterables import strongly_connected_components
 
 from lie_codegen.kernel.arithmetic import Scalar
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 #: (row, column) -> entry; what is not there is zero.
 SparseMatrix = Mapping[tuple[int, int], Scalar]
@@ -50,27 +50,6 @@ def solve(matrix: SparseMatrix, right_hand_sides: Sequence[Mapping[int, Scalar]]
                 continue
             x.update((i, value) for i, value in zip(block, factor.solve(residual), strict=True) if not is_zero(value))
     return solutions
-
-
-def is_zero(value: Any) -> bool:
-    """Whether a scalar is a plain Python zero: a structural zero."""
-    return isinstance(value, int | float) and value == 0
-
-
-def product(a: Scalar, b: Scalar) -> Scalar:
-    """a b, with plain zeros and ones absorbed."""
-    if is_zero(a) or is_zero(b):
-        return 0
-    if isinstance(a, int) and a == 1:
-        return b
-    if isinstance(b, int) and b == 1:
-        return a
-    return a * b
-
-
-def add(a: Scalar, b: Scalar) -> Scalar:
-    """a + b, with plain zeros absorbed."""
-    return b if is_zero(a) else a if is_zero(b) else a + b
 
 
 def determinant(matrix: Sequence[Sequence[Scalar]]) -> Scalar:

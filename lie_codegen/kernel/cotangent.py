@@ -13,7 +13,7 @@ from functools import cache
 from math import comb
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import is_zero
+from lie_codegen.kernel.structural_zeros import is_zero
 
 #: |z| below which pole and series are used: beyond pi^2, the principal domain of a rotation's logarithm.
 SWITCH = 12

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.routine import call_routine
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ import sympy as sp
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, product
+from lie_codegen.kernel.structural_zeros import add, product
 
 Vector = list[Scalar]
 Matrix = list[list[Scalar]]

@@ -7,9 +7,10 @@ from itertools import combinations
 from typing import Any
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product, solve
+from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 
 def inverse(ops: Arithmetic, matrix: Sequence[Sequence[Scalar]]) -> Matrix:

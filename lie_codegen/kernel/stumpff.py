@@ -12,7 +12,7 @@ from fractions import Fraction
 from math import factorial
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import is_zero
+from lie_codegen.kernel.structural_zeros import is_zero
 
 #: |z| below which the two highest functions are summed as series; above it sine and cosine go up the recurrence.
 SWITCH = 1

@@ -25,7 +25,7 @@ from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import is_zero, product, solve
+from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -42,6 +42,7 @@ from lie_codegen.kernel.linear import (
     scaled,
 )
 from lie_codegen.kernel.small_inverse import inverse
+from lie_codegen.kernel.structural_zeros import is_zero, product
 from lie_codegen.mechanics.kernels import coadjoint
 
 _NEWTON = 3

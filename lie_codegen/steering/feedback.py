@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, ShapeError, SteeringError, SteeringInputError
-from lie_codegen.flow.metric import distance, element_coordinates
+from lie_codegen.flow.logarithm import distance
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.steering.finish import energy
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by, solver_of

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from lie_codegen.arrays import Array
-from lie_codegen.flow.metric import distance
+from lie_codegen.flow.logarithm import distance
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task

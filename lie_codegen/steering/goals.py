@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError, SteeringInputError
-from lie_codegen.flow.metric import group_element
+from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 Numbers = tuple[Any, ...]

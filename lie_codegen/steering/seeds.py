@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.flow.metric import element_coordinates
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.task import Task
 

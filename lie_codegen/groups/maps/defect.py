@@ -16,9 +16,9 @@ from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.membership import Form, Membership, membership
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, matmul, number, total
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 #: What a wrong component counts: a determinant of -1 is off by 2.
 WRONG_COMPONENT = 2

@@ -31,9 +31,10 @@ from lie_codegen.groups.maps.spectral_functions import (
     plain_jacobian_of_exp,
 )
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import is_zero, solve
+from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, Vector, bracket, dot, identity, number
+from lie_codegen.kernel.structural_zeros import is_zero
 
 _FUNCTIONS: dict[tuple[str, bool], MatrixFunction] = {
     ("left", False): LEFT_JACOBIAN,

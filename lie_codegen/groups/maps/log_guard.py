@@ -14,9 +14,9 @@ from lie_codegen.groups.maps.log_structure import LogBlock
 from lie_codegen.groups.maps.membership import blocks_suffice, membership
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import cross, dot, minus, number, total
+from lie_codegen.kernel.structural_zeros import add, product
 
 _KINDS = ("space", "plane", "phase", "spin")
 

@@ -37,11 +37,11 @@ from lie_codegen.groups.maps.logarithm import candidate
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
 from lie_codegen.groups.maps.rkmk import hat_body
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matmul, matvec, total
 from lie_codegen.kernel.routine import Routine, call_routine
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 #: The defect up to which a closed form is taken as it is: rounding.
 _ROUNDING = 1e-13

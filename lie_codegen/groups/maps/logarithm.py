@@ -32,9 +32,9 @@ from lie_codegen.groups.maps.log_structure import LogBlock, LogStructure
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.matrix_function import RIGHT_JACOBIAN_INVERSE, FunctionOfMatrix, LinearFamily
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, Vector, matadd, matmul, matvec, number, plus
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 
 def candidate(ops: Arithmetic, data: GroupDerivation, X: Entries, iterated: Sequence[Scalar] = ()) -> Vector:

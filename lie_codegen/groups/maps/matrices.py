@@ -10,10 +10,11 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, product, solve
+from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import Matrix, Vector, cross, dot, matmul, matvec, minus, number, plus, scaled
+from lie_codegen.kernel.structural_zeros import add, product
 
 
 class GroupMatrices:

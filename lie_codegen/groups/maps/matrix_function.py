@@ -23,9 +23,9 @@ import sympy as sp
 from lie_codegen.exact.quadratic_form import QuadraticForm
 from lie_codegen.exact.spectral_pattern import ColumnPattern
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.cotangent import CotangentFunctions, taylor
 from lie_codegen.kernel.linear import number
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.kernel.stumpff import StumpffFunctions, derivative_weights
 
 #: (odd, a, order): the tail after a Taylor terms of the even or odd part, differentiated.

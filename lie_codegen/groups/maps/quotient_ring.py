@@ -12,10 +12,10 @@ from fractions import Fraction
 
 from lie_codegen.exact.invariant_form import Relation
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, identity, matadd, number, scaled
 from lie_codegen.kernel.small_inverse import inverse
+from lie_codegen.kernel.structural_zeros import add, product
 
 Element = list[Scalar]
 

@@ -24,7 +24,6 @@ from lie_codegen.groups.maps.log_routine import far_log
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.membership import Form, Membership, blocks_suffice, membership
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import (
     Matrix,
@@ -37,6 +36,7 @@ from lie_codegen.kernel.linear import (
     total,
     transpose,
 )
+from lie_codegen.kernel.structural_zeros import add, product
 
 
 def renormalised(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Matrix:

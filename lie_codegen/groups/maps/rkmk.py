@@ -12,10 +12,10 @@ from lie_codegen.groups.maps.short_exponential import short_pattern, times_short
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp, rate
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, is_zero, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Body, Kernel, Port
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 #: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
 TAYLOR_DEGREE = 12

@@ -20,7 +20,7 @@ from lie_codegen.exact.spectral_pattern import spectral_pattern
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import is_zero
+from lie_codegen.kernel.structural_zeros import is_zero
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from lie_codegen.exact.even_spectrum import EvenSpectrum, newton_coefficients
 from lie_codegen.exact.invariant_form import Relation
 from lie_codegen.groups.maps.quotient_ring import Element, QuotientRing, matrix_value, power_sums, related_product
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add, product
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.cotangent import four_pi_squared, taylor
 from lie_codegen.kernel.linear import Matrix, identity, matadd
+from lie_codegen.kernel.structural_zeros import add, product
 
 _HALVINGS = 4
 _EVEN_TERMS = 11

@@ -22,8 +22,9 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
 from lie_codegen.groups.wei_norman.frames import Factors, Frames, Step, cheapest_steps, times_vector
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import SparseMatrix, add, product
+from lie_codegen.kernel.block_solve import SparseMatrix
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.structural_zeros import add, product
 
 
 @dataclass(frozen=True)

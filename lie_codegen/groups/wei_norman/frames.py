@@ -18,7 +18,8 @@ from typing import Any
 
 from lie_codegen.exact.exponential import MatrixExponential
 from lie_codegen.kernel.arithmetic import Scalar
-from lie_codegen.kernel.block_solve import SparseMatrix, add, blocks_of, is_zero, product, solve
+from lie_codegen.kernel.block_solve import SparseMatrix, blocks_of, solve
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 #: (k, forward) -> exp(g_k ad_k) if forward, else exp(-g_k ad_k), sparse.
 Factors = Callable[[int, bool], SparseMatrix]
@@ -109,7 +110,9 @@ class _Candidate:
 
 def _candidates(patterns: Sequence[set[tuple[int, int]]], size: int) -> Iterator[_Candidate]:
     """The diagonal blocks of every frame, with the unknowns outside that their rows hold."""
-    frames = Frames(lambda k, _: dict.fromkeys(patterns[k], _PRESENT), size)
+    # Only which entries are zero matters here: any scalar that is no plain zero stands for the others.
+    entry = _OperationCount()
+    frames = Frames(lambda k, _: dict.fromkeys(patterns[k], entry), size)
     for frame in range(size + 1):
         matrix = frames.matrix(frame)
         for block in map(frozenset, blocks_of(matrix, size)):
@@ -134,37 +137,51 @@ def _minus(a: Scalar, b: Scalar) -> Scalar:
     return a if is_zero(b) else -b if is_zero(a) else a - b
 
 
-class _Count:
-    """A scalar that remembers what it was made of: for counting the operations that a result needs."""
+class _OperationCount:
+    """A stand-in for a scalar that remembers what it was made of, so that the operations a result needs can be counted.
+
+    A sum, a difference and a product weigh 1, a quotient 4, about what they take in C; a change of sign is free. What two
+    results share is one object, and counts once.
+    """
 
     __slots__ = ("parts", "weight")
 
     def __init__(self, weight: int = 0, *parts: Any) -> None:
         self.weight = weight
-        self.parts = tuple(part for part in parts if isinstance(part, _Count))
+        self.parts = tuple(part for part in parts if isinstance(part, _OperationCount))
 
-    def __add__(self, other: Any) -> _Count:
-        return _Count(1, self, other)
+    def __add__(self, other: Any) -> _OperationCount:
+        return _OperationCount(1, self, other)
 
-    def __neg__(self) -> _Count:
-        return _Count(0, self)
+    def __radd__(self, other: Any) -> _OperationCount:
+        return _OperationCount(1, other, self)
 
-    def __truediv__(self, other: Any) -> _Count:
-        return _Count(4, self, other)
+    def __sub__(self, other: Any) -> _OperationCount:
+        return _OperationCount(1, self, other)
 
-    __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __add__
+    def __rsub__(self, other: Any) -> _OperationCount:
+        return _OperationCount(1, other, self)
 
+    def __mul__(self, other: Any) -> _OperationCount:
+        return _OperationCount(1, self, other)
 
-_PRESENT = _Count()
+    def __rmul__(self, other: Any) -> _OperationCount:
+        return _OperationCount(1, other, self)
+
+    def __neg__(self) -> _OperationCount:
+        return _OperationCount(0, self)
+
+    def __truediv__(self, other: Any) -> _OperationCount:
+        return _OperationCount(4, self, other)
 
 
 def _cost(exponentials: Sequence[MatrixExponential], steps: Sequence[Step]) -> int:
     """Weighted operations to solve for one right-hand side; a division counts four."""
     size = len(exponentials)
     factors = [{place: _leaf(data, place) for place in data.entries} for data in exponentials]
-    solution = Frames(lambda k, _: factors[k], size).solve(steps, {i: _Count() for i in range(size)})
+    solution = Frames(lambda k, _: factors[k], size).solve(steps, {i: _OperationCount() for i in range(size)})
     seen: set[int] = set()
-    stack = [value for value in solution.values() if isinstance(value, _Count)]
+    stack = [value for value in solution.values() if isinstance(value, _OperationCount)]
     total = 0
     while stack:
         node = stack.pop()
@@ -180,4 +197,4 @@ def _leaf(data: MatrixExponential, place: tuple[int, int]) -> Any:
         mode.power == 0 and mode.rate == 0 and mode.frequency == 0
         for mode in map(data.modes.__getitem__, data.entries[place])
     )
-    return 1 if constant and list(data.entries[place].values()) == [1] else _Count()
+    return 1 if constant and list(data.entries[place].values()) == [1] else _OperationCount()

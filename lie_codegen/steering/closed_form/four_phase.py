@@ -24,7 +24,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
-from lie_codegen.flow.metric import matrix_log, second_kind
+from lie_codegen.flow.logarithm import matrix_log
+from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.steering.closed_form.free_amplitude import LineAndCircles, free_amplitude
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status

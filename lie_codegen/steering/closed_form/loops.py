@@ -7,7 +7,7 @@ import time
 from scipy.linalg import expm
 
 from lie_codegen.errors import SteeringError, SteeringInputError
-from lie_codegen.flow.metric import matrix_log
+from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop
 from lie_codegen.steering.finish import finish

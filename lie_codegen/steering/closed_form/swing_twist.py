@@ -19,7 +19,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringInputError
-from lie_codegen.flow.metric import element_coordinates
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status

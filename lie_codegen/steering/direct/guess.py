@@ -55,7 +55,7 @@ def _of_plan(task: Manoeuvre, plan: Plan, s: Array) -> Array:
 
 def _of_path(task: Manoeuvre, X: Array) -> Array:
     """Controls whose velocity is nearest to that of a path at equal times, log(X_k^-1 X_(k+1)) / dt."""
-    from lie_codegen.flow.metric import matrix_log
+    from lie_codegen.flow.logarithm import matrix_log
 
     system, steps = task.system, len(X) - 1
     h = task.duration / steps

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InfeasibleError, ShapeError, SteeringError, SteeringInputError
-from lie_codegen.flow.metric import group_element
+from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.constraints import box_limits
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces

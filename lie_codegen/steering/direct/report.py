@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.flow.metric import distance
+from lie_codegen.flow.logarithm import distance
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.polish import Flown

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.flow.metric import element_coordinates
+from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.steering.direct.assemble import Manoeuvre
 
 #: Sizes of the waves, in units of the bounds: larger ones start at the bounds and stay there (measured on two-qubit gates).

@@ -8,7 +8,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import LieCodegenError
-from lie_codegen.flow.metric import distance, group_element
+from lie_codegen.flow.elements import group_element
+from lie_codegen.flow.logarithm import distance
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.ocp.problem_data import ProblemData

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.flow.metric import group_element
+from lie_codegen.flow.elements import group_element
 from lie_codegen.steering.ocp.machine import loop_machine
 from lie_codegen.steering.ocp.problem import OptimalControlProblem, pack_element, unpack_elements
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-from lie_codegen.flow.metric import group_element
+from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.end import end_error
 from lie_codegen.steering.ocp.free_duration import best_duration

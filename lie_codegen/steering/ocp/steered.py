@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputError
-from lie_codegen.flow.metric import group_element
+from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.goals import Pointing, Position
 from lie_codegen.steering.ocp.front import ocp

@@ -18,10 +18,10 @@ from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.rkmk import bracket_body, hat_body, sum_products
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import add
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import plus
+from lie_codegen.kernel.structural_zeros import add
 from lie_codegen.steering.shooting.lie_poisson_ends import advance, correction, endpoint, offset, sparse_product
 
 
@@ -117,15 +117,15 @@ def leap(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
         group.name,
         (
             Port("v", (len(controls),)),
-            *(Port(name, (n,)) if name.startswith("mu") else Port(name, (size,)) for name in _LEAP),
+            Port("mu_before", (n,)),
+            Port("X_before", (size,)),
+            Port("mu", (n,)),
+            Port("X", (size,)),
         ),
         (Port("mu_next", (n,)), Port("X_next", (size,))),
         body,
         formula="before + 2 h f(here), v_i = 2 h / w_i",
     )
-
-
-_LEAP = ("mu_before", "X_before", "mu", "X")
 
 
 @kernel_factory()

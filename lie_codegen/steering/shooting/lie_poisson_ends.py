@@ -9,10 +9,10 @@ from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.rkmk import bracket_body, hat_body, sum_products, times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.block_solve import is_zero
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.structural_zeros import is_zero
 
 #: Taylor degree of the exponential in the seed's logarithm, for |theta| below 1.
 SEED_EXPONENTIAL_DEGREE = 8

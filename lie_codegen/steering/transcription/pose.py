@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
-from lie_codegen.flow.metric import group_element
+from lie_codegen.flow.elements import group_element
 from lie_codegen.steering.constraints import Cone, check_obstacles, limits
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.torque_reach import require_torques_reach

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, SteeringError
-from lie_codegen.flow.metric import distance
+from lie_codegen.flow.logarithm import distance
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.task import Task

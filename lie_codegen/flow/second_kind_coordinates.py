@@ -1,0 +1,90 @@
+"""Coordinates of the second kind, X = exp(g_1 A_1) ... exp(g_n A_n), by Newton's method from several starts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.arrays import Array
+from lie_codegen.errors import NotOnGroupError
+from lie_codegen.flow.chart import mismatch, newton
+from lie_codegen.flow.libraries import integrators
+from lie_codegen.flow.logarithm import matrix_log
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+#: Of the random starts.
+_SEED = 20
+
+
+def element_coordinates(group: MatrixGroup, X: ArrayLike) -> Array:
+    """(n,) the logarithm of X where it has one, else its coordinates of the second kind, else 0: a first guess."""
+    x, off = matrix_log(group, X)
+    if off <= 1e-6:
+        return x
+    try:
+        return second_kind(group, X)
+    except NotOnGroupError:
+        return np.zeros(group.dim)
+
+
+def second_kind(group: GroupLike, X: ArrayLike) -> Array:
+    """g with exp(g_1 A_1) ... exp(g_n A_n) = X, the one nearest to 0 that Newton's method finds.
+
+    Raises:
+        NotOnGroupError: if none is found from 0, from log X, or from random starts.
+    """
+    group = as_group(group, "second_kind")
+    target = np.asarray(X)
+    rng = np.random.default_rng(_SEED)
+    starts = np.vstack([np.zeros(group.dim), matrix_log(group, target)[0], rng.uniform(-2, 2, (200, group.dim))])
+    found = _damped(group, starts, target)
+    off = mismatch(group, found, np.broadcast_to(target, (len(found), *target.shape)))
+    scale = max(1.0, float(np.max(np.abs(target))))
+    good = off <= 1e-10 * scale
+    if not np.any(good):
+        raise NotOnGroupError(
+            f"{group.name}: no coordinates of the second kind found; the nearest element reached differs by "
+            f"{np.nanmin(off):.3g}; the matrix is not on the group, or not in the image of the chart "
+            f"{', '.join(group.labels)}"
+        )
+    sizes = np.where(good, np.linalg.norm(found, axis=1), np.inf)
+    return np.asarray(found[np.argmin(sizes)])
+
+
+def _damped(group: MatrixGroup, g: Array, target: Array) -> Array:
+    """Gauss-Newton on |Phi(g) - X|^2 with Levenberg's damping, for all starts at once; then Newton."""
+    lib = integrators(group)
+    damping = np.full(len(g), 1e-2)
+    residual, columns = _linearised(group, g, target)
+    cost = np.sum(residual**2, axis=1)
+    for _ in range(40):
+        normal = np.einsum("kri,krj->kij", columns, columns) + damping[:, None, None] * np.eye(group.dim)
+        step = np.linalg.solve(normal, -np.einsum("kri,kr->ki", columns, residual)[..., None])[..., 0]
+        trial = g + step
+        with np.errstate(all="ignore"):
+            values = lib.product_exp.batch(trial)
+        new_cost = np.sum(np.abs(values - target) ** 2, axis=(1, 2))
+        better = new_cost < cost
+        g = np.where(better[:, None], trial, g)
+        damping = np.clip(np.where(better, damping / 4, damping * 8), 1e-14, 1e8)
+        residual, columns = _linearised(group, g, target)
+        cost = np.sum(residual**2, axis=1)
+    with np.errstate(all="ignore"):
+        return newton(group, g, np.broadcast_to(target, (len(g), *target.shape)))
+
+
+def _linearised(group: MatrixGroup, g: Array, target: Array) -> tuple[Array, Array]:
+    """Residual Phi(g) - X and its derivative by g, real and imaginary parts stacked: d/dg_k Phi = Phi hat(M^-1 e_k)."""
+    lib = integrators(group)
+    phi = lib.product_exp.batch(np.ascontiguousarray(g))
+    difference = (phi - target).reshape(len(g), -1)
+    with np.errstate(all="ignore"):
+        inverse = np.linalg.pinv(
+            np.nan_to_num(lib.wei_norman_matrix.batch(np.ascontiguousarray(g)), posinf=0, neginf=0)
+        )
+    directions = group.hat(np.swapaxes(inverse, 1, 2))
+    moved = (phi[:, None] @ directions).reshape(len(g), group.dim, -1)
+    residual = np.concatenate([difference.real, difference.imag], axis=1)
+    columns = np.concatenate([moved.real, moved.imag], axis=2).swapaxes(1, 2)
+    return residual, columns
