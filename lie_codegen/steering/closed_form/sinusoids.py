@@ -17,15 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
-from lie_codegen.flow.metric import second_kind
+from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
-
-Array = NDArray[np.float64]
 
 _STEPS = 4096
 _TINY = 1e-13
