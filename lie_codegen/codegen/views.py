@@ -159,7 +159,7 @@ def package_view(
             _told_apart(kernel_view(kernel, tape, target, in_parts=True), names)
             for kernel, tape in zip(kernels, tapes, strict=True)
         ),
-        routines=tuple(routine_view(routine) for routine in routines_of(tapes)),
+        routines=_routine_views(routines_of(tapes)),
     )
 
 
@@ -169,10 +169,15 @@ def routines_of(tapes: Iterable[Tape]) -> tuple[Routine, ...]:
     return tuple(dict.fromkeys(routine for routine in found if routine is not None))
 
 
-def routine_view(routine: Routine) -> RoutineView:
-    """The C text of a routine and of the kernels it calls, all in double."""
-    helpers = tuple(kernel_view(kernel, tape_of(kernel), in_parts=True) for kernel in routine.helpers)
-    return RoutineView(helpers, render(routine.template, name=routine.name, **dict(routine.settings)))
+def _routine_views(routines: Iterable[Routine]) -> tuple[RoutineView, ...]:
+    """The C text of routines and of the kernels they call, each of these once, all in double."""
+    views, printed = [], set[str]()
+    for routine in routines:
+        fresh = [kernel for kernel in routine.helpers if kernel.symbol not in printed]
+        printed.update(kernel.symbol for kernel in fresh)
+        helpers = tuple(kernel_view(kernel, tape_of(kernel), in_parts=True) for kernel in fresh)
+        views.append(RoutineView(helpers, render(routine.template, name=routine.name, **dict(routine.settings))))
+    return tuple(views)
 
 
 def _told_apart(view: KernelView, names: Sequence[str]) -> KernelView:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from functools import cache
+from pathlib import Path
 
 import casadi as ca
 import generators
@@ -257,3 +260,77 @@ def test_known_answers_come_back_with_the_conditioning_of_the_inverse_jacobian()
         core = scipy.linalg.block_diag(generators.half_turn_less(delta), generators.half_turn_less(2 * delta))
         x = compiled(group)(Q @ core @ Q.T)
         assert np.linalg.norm(group.hat(x) - A) < 4e-15 * 2 * np.pi / (3 * delta) + 1e-13
+
+
+STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow"]
+SANITIZE = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+DRIVER = """#include <math.h>
+#include <stdio.h>
+#include "{name}.h"
+#include "data.h"
+int main(void)
+{{
+    double x[64];
+    int i;
+    for (i = 0; i < {count}; ++i) {{
+        {name}_log(data[i], x);
+        printf("%d", x[0] == x[0]);
+    }}
+    return 0;
+}}
+"""
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc and its sanitizers")
+@pytest.mark.parametrize("name", ["su3", *(pytest.param(each, marks=pytest.mark.slow) for each in ("sp4", "so5"))])
+def test_the_c_of_iterated_logarithms_is_strict_and_sound_on_anything(name: str, tmp_path: Path) -> None:
+    """NaN, infinity, zero and singular matrices, Jordan blocks, tiny and huge ones, under the sanitizers of gcc."""
+    rng = np.random.default_rng(15)
+    group = lc.group(name)
+    d = group.degree
+    elements = [scipy.linalg.expm(group.hat(rng.normal(size=group.dim))) for _ in range(10)]
+    jordan = -np.eye(d)
+    jordan[0, -1] = 1
+    odd = [np.zeros((d, d)), np.full((d, d), np.nan), np.full((d, d), np.inf), np.ones((d, d)), 1e-200 * np.eye(d)]
+    odd += [1e200 * np.eye(d), rng.normal(size=(d, d))]
+    kind = complex if group.is_complex else float
+    rows = (
+        np.array([np.asarray(X, dtype=kind) for X in [*elements, jordan, *odd]])
+        .view(np.float64)
+        .reshape(len(elements) + 8, -1)
+    )
+    words = {"nan": "NAN", "inf": "INFINITY"}
+    text = ",".join("{" + ",".join(words.get(repr(float(v)), repr(float(v))) for v in row) + "}" for row in rows)
+    folder = lc.generate([k for k in lc.group_kernels(group) if k.name == "log"], tmp_path / "package")
+    (tmp_path / "data.h").write_text(f"static const double data[{len(rows)}][{rows.shape[1]}] = {{{text}}};\n")
+    (tmp_path / "driver.c").write_text(DRIVER.format(name=name, count=len(rows)))
+    command = [
+        "gcc",
+        *STRICT,
+        *SANITIZE,
+        f"-I{folder}/include",
+        "-I.",
+        "driver.c",
+        f"{folder}/src/{name}.c",
+        "-lm",
+        "-o",
+        "driver",
+    ]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    ran = subprocess.run(["./driver"], cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout[: len(elements)] == "1" * len(elements)
+    assert ran.stdout[len(elements) + 1 :] == "0" * 7
+
+
+@pytest.mark.slow
+def test_two_routines_of_one_group_share_their_helpers(tmp_path: Path) -> None:
+    """log and renormalise of a group in which both are iterated: the example of the package compiles and passes."""
+    group = generators.spin_group(3)
+    kernels = [k for k in lc.group_kernels(group) if k.name in ("log", "renormalise")]
+    folder = lc.generate(kernels, tmp_path / "package")
+    command = ["gcc", *STRICT, "-O1", "-Iinclude", "example.c", f"src/{group.name}.c", "-lm", "-o", "example"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert subprocess.run(["./example"], cwd=folder).returncode == 0
