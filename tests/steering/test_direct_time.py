@@ -83,7 +83,7 @@ def test_least_time_needs_bounds_and_says_when_it_found_nothing() -> None:
     se2 = lc.group("se2")
     with pytest.raises(lc.errors.SteeringInputError, match="bounds"):
         lc.steer(se2, pose(1, 0, 0), ("omega",), 5.0, method="direct", drift=(0, 1, 0), objective="time")
-    with pytest.raises(lc.errors.SteeringError, match="proves nothing"):
+    with pytest.raises(lc.errors.SteeringError, match="proves nothing") as error:
         lc.steer(
             se2,
             pose(40, 0, 0),
@@ -96,6 +96,8 @@ def test_least_time_needs_bounds_and_says_when_it_found_nothing() -> None:
             rounds=1,
             starts=4,
         )
+    assert error.value.best.status.name == "NOT_FOUND"
+    assert max(error.value.violation.values()) > 1
 
 
 def test_a_robust_flip_serves_every_system_of_the_spread() -> None:

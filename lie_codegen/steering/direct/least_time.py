@@ -26,9 +26,9 @@ from lie_codegen.steering.direct.flight import fly
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Settings, chosen
-from lie_codegen.steering.direct.report import plan_of
+from lie_codegen.steering.direct.report import error_at, plan_of
 from lie_codegen.steering.direct.search import threshold
-from lie_codegen.steering.plan import Plan
+from lie_codegen.steering.plan import Plan, Status
 
 #: Words of n arcs are all tried up to that many; else as many drawn at random.
 _MOST_WORDS = 1024
@@ -71,6 +71,7 @@ def least_time(
     limits = _limits(task, velocities, longest)
     tried: list[str] = []
     best: list[tuple[float, Array, Array, int]] = []
+    nearest: tuple[float, Array, Array, int] | None = None
     total = reached = agree = 0
     n = task.system.group.dim
     for round_ in range(rounds):
@@ -83,7 +84,8 @@ def least_time(
             ("long words", _long_words(len(letters), long, 4 * starts, rng)),
             ("long words without zeros", bangs[_long_words(len(bangs), long, 2 * starts, rng)]),
         ):
-            found = _solve(arcs, solver, velocities, limits, words, settings, longest, rng)
+            found, near = _solve(arcs, solver, velocities, limits, words, settings, longest, rng)
+            nearest = near if nearest is None or near[0] < nearest[0] else nearest
             total += len(words)
             reached += len(found)
             tried.append(
@@ -96,11 +98,7 @@ def least_time(
         if agree >= _ENOUGH:
             break
     if not best:
-        raise SteeringError(
-            f"steer({task.system.group.name}): no word of up to {_LONG * n * rounds} arcs was found that reaches the goal within {longest:g} times "
-            f"the given duration, from {total} starts ({rounds} rounds, seed {seed}), which proves nothing; more starts, another seed, "
-            "a larger `longest`"
-        )
+        raise _not_found(task, target, tolerance, letters, nearest, tried, total, seed, longest, began)
     best = [
         *(_sharpened(arcs, solver, velocities, limits, each, settings, longest) for each in best[:_SHARPENED]),
         *best[_SHARPENED:],
@@ -126,6 +124,43 @@ def least_time(
     if task.end.phases:
         details["phase"] = task.end.phases[variant]
     return plan_of(task, target, flown, variant, tolerance, "time", details, {"solve": time.perf_counter() - began})
+
+
+def _not_found(
+    task: Manoeuvre,
+    target: Any,
+    tolerance: float,
+    letters: Array,
+    nearest: tuple[float, Array, Array, int] | None,
+    tried: list[str],
+    total: int,
+    seed: int,
+    longest: float,
+    began: float,
+) -> SteeringError:
+    """The error, with the word that ends nearest to the goal."""
+    said = (
+        f"steer({task.system.group.name}): no word of arcs was found that reaches the goal within {longest:g} times the given duration, "
+        f"from {total} starts (seed {seed}), which proves nothing; more starts, another seed, a larger `longest`"
+    )
+    if nearest is None:
+        return SteeringError(said)
+    _, word, durations, variant = nearest
+    flown, sequence = _flown(task, letters, word, durations, variant)
+    details: dict[str, Any] = {
+        "tried": tuple(tried),
+        "starts": total,
+        "reached": 0,
+        "agree": 0,
+        "seed": seed,
+        "arcs": sequence,
+        "objective": "time",
+    }
+    over = float(flown.inputs.knots[-1]) - longest * task.duration
+    details["violation"] = {"end": error_at(task, flown, variant), "duration": max(0.0, over)}
+    took = {"solve": time.perf_counter() - began}
+    plan = plan_of(task, target, flown, variant, tolerance, "time", details, took, Status.NOT_FOUND)
+    return SteeringError(said, best=plan, violation=plan.violation)
 
 
 def _letters(task: Manoeuvre, vertices: ArrayLike | None) -> tuple[Array, Array]:
@@ -214,8 +249,9 @@ def _solve(
     settings: Settings,
     longest: float,
     rng: np.random.Generator,
-) -> list[tuple[float, Array, Array, int]]:
-    """(duration, word, durations, variant) of words that reach the goal, the shortest of them descended."""
+) -> tuple[list[tuple[float, Array, Array, int]], tuple[float, Array, Array, int]]:
+    """(duration, word, durations, variant) of words that reach the goal, the shortest of them descended; and (residual, word,
+    durations, variant) of the nearest."""
     lanes, count = words.shape
     programme = _words_programme(arcs, velocities, words, longest)
     variant = np.arange(lanes) % len(arcs.end.values)
@@ -231,8 +267,10 @@ def _solve(
     there = np.flatnonzero(found.size <= threshold(arcs, settings))
     length = np.sum(np.minimum(arcs.own(found.u)[..., 0], limits[words]), axis=1)
     there = there[np.argsort(length[there], kind="stable")][:_KEPT]
+    close = int(np.nanargmin(found.size))
+    near = (float(found.size[close]), words[close], found.u[close], int(variant[close]))
     if not len(there):
-        return []
+        return [], near
     part, aim = chosen(programme, goal, there)
     lower = solver.descend(part, aim, found.u[there], settings)
     results = []
@@ -242,7 +280,7 @@ def _solve(
         )
         if size <= threshold(arcs, settings) and np.sum(arcs.own(durations)) <= longest:
             results.append((float(np.sum(arcs.own(durations))), word, durations, int(variant[number])))
-    return results
+    return results, near
 
 
 def _sharpened(
