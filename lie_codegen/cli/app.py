@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import typer
 
+from lie_codegen import __version__
 from lie_codegen.cli import averages, bench, code, groups, motion
-from lie_codegen.cli.output import complain
+from lie_codegen.cli.output import complain, emit
 from lie_codegen.errors import InputError, LieCodegenError
 
 app = typer.Typer(
@@ -19,7 +20,25 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        emit(f"lie-codegen {__version__}", {"version": __version__}, False)
+        raise typer.Exit
+
+
+@app.callback()
+def _before(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """From a Lie algebra to fast C: exact Wei-Norman equations, generated C, simulation and steering."""
+
+
 for _part in (groups.commands, code.commands, motion.commands, averages.commands, bench.commands):
     for _command in _part:
         app.command()(_command)

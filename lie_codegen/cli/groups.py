@@ -15,7 +15,10 @@ from lie_codegen.identifiers import check_identifier
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 #: Dimension up to which M(g) is printed unasked.
 _SHOWN = 6
-GroupName = Annotated[str, typer.Argument(help="A catalogue name, or the path of a group file (.toml).")]
+GroupName = Annotated[
+    str,
+    typer.Argument(help="A catalogue name, the path of a group file (.toml), or - for a group file on standard input."),
+]
 
 
 def list_groups(

@@ -68,7 +68,9 @@ def _write_csv(path: Path, t: Any, X: Any) -> None:
 
 
 def reproduce(
-    figure: Annotated[str, typer.Argument(help="Name of the figure; 'list' names them.")] = "satellite",
+    figure: Annotated[
+        str, typer.Argument(help="Name of the figure; 'list' names them, 'all' makes every one.")
+    ] = "satellite",
     out: Annotated[Path, _Optional(help="Folder for the picture and its numbers.")] = Path("results"),
     json: Json = False,
 ) -> None:
@@ -79,6 +81,14 @@ def reproduce(
     if figure == "list":
         names = {each.name: each.about for each in TARGETS}
         emit("\n".join(f"{name:24} {about}" for name, about in names.items()), {"figures": names}, json)
+        return
+    if figure == "all":
+        done = []
+        for each in TARGETS:
+            with progress(f"reproduce {each.name}") as report:
+                done.append(run_target(each.name, out, report))
+        pictures = {result.name: result.picture.resolve() for result in done}
+        emit("\n".join(f"{name:28} {path}" for name, path in pictures.items()), {"pictures": pictures}, json)
         return
     with progress(f"reproduce {figure}") as report:
         result = run_target(figure, out, report)

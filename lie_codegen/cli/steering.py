@@ -9,7 +9,7 @@ import typer
 
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
-from lie_codegen.cli.steering_texts import limits_of, numbers, obstacle_ball, obstacle_cone, via_point
+from lie_codegen.cli.steering_texts import limits_of, numbers, obstacle_ball, obstacle_cone, target_of, via_point
 
 _Optional = typer.Option
 _LIMITS = "one number, low:high, or label=either, comma-separated."
@@ -18,7 +18,11 @@ _LIMITS = "one number, low:high, or label=either, comma-separated."
 def steer(
     group: GroupName,
     target: Annotated[
-        str, _Optional(help="Coordinates of the second kind: comma-separated numbers, pi and sqrt allowed.")
+        str,
+        _Optional(
+            help="Coordinates of the second kind: comma-separated numbers, pi and sqrt allowed; or a file: the rows of a matrix of the "
+            "group, or coordinates (.npy, .csv or text)."
+        ),
     ],
     controls: Annotated[str, _Optional(help="Comma-separated labels of the actuated basis elements.")],
     duration: Annotated[float, _Optional(help="Seconds.")] = 1.0,
@@ -68,6 +72,10 @@ def steer(
     from lie_codegen.groups.catalogue_load import group as load
     from lie_codegen.steering.front import steer as plan_steering
 
+    if picture is not None:
+        from lie_codegen.pictures.plot_plan import picture_path
+
+        picture_path(picture)  # before anything is solved
     g = load(group)
     obstacles: list[Any] = [*map(obstacle_cone, cone or ()), *map(obstacle_ball, ball or ())]
     options: dict[str, Any] = {
@@ -94,7 +102,7 @@ def steer(
     }
     given = {name: value for name, value in options.items() if value is not None}
     names = [name.strip() for name in controls.split(",")]
-    goal = numbers(target, "--target", g.labels)
+    goal = target_of(target, g)
     plan = plan_steering(g, goal, names, duration, method, **given)
     t = np.linspace(0, plan.duration, max(2, samples))
     data = {

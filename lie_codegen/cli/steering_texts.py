@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import InputError, ShapeError
 
 if TYPE_CHECKING:
+    from lie_codegen.groups.matrix_group import MatrixGroup
     from lie_codegen.steering.constraints import Ball, Cone
 
 Limits = float | tuple[float, float]
@@ -27,6 +28,30 @@ def numbers(text: str, option: str, labels: Sequence[str] = ()) -> list[float]:
         wanted = f"{len(labels)} real numbers for {', '.join(labels)}" if labels else "real numbers, comma-separated"
         raise ShapeError(f"steer: {option} needs {wanted}, got {text!r}")
     return [float(value) for value in values]
+
+
+def target_of(text: str, group: MatrixGroup) -> Any:
+    """Coordinates as text, or what the file of that name holds: the rows of an element, or coordinates.
+
+    Raises:
+        InputError: the file holds no numbers.
+        ShapeError, ExpressionError: as `numbers`.
+    """
+    from pathlib import Path
+
+    import numpy as np
+
+    path = Path(text)
+    if not path.is_file():
+        return numbers(text, "--target", group.labels)
+    try:
+        if path.suffix == ".npy":
+            return np.load(path, allow_pickle=False)
+        rows = path.read_text(encoding="utf-8").replace(",", " ").splitlines()
+        kind = complex if group.is_complex else float
+        return np.squeeze(np.array([[kind(each) for each in row.split()] for row in rows if row.strip()]))
+    except (ValueError, OSError, UnicodeDecodeError) as error:
+        raise InputError(f"steer: --target {path}: rows of numbers are wanted: {error}") from None
 
 
 def limits_of(text: str, option: str) -> Limits | dict[str, Limits]:

@@ -23,6 +23,8 @@ _FAMILIES = {
     "symplectic": r"sp(\d{1,2})",
     "heisenberg": r"h(\d{1,2})",
 }
+#: The name of a group file that comes on standard input.
+STANDARD_INPUT = "-"
 #: One member of each family, for messages and tests.
 FAMILY_EXAMPLES = ("r4", "so5", "so22", "se4", "se_3_3", "su4", "sl4", "gl3", "sp6", "h7")
 
@@ -65,6 +67,8 @@ def group_path(name_or_path: str | Path) -> Path:
         UnknownGroupError: if there is neither, with the names there are.
     """
     text = plain_name(name_or_path)
+    if text == STANDARD_INPUT:
+        return Path("standard input")
     if text in group_names():
         return _FOLDER / f"{text}.toml"
     path = Path(name_or_path)
@@ -76,6 +80,14 @@ def group_path(name_or_path: str | Path) -> Path:
     )
 
 
+@cache
+def _standard_input() -> bytes:
+    """The group file that comes on standard input, which can be read once."""
+    import sys
+
+    return sys.stdin.buffer.read()
+
+
 def definition_source(name_or_path: str | Path) -> bytes:
     """What determines the group: the bytes of its file, or the name of a member of a family.
 
@@ -83,6 +95,8 @@ def definition_source(name_or_path: str | Path) -> bytes:
         UnknownGroupError: no such name; lists those there are.
         GroupFileError: the file cannot be read.
     """
+    if str(name_or_path) == STANDARD_INPUT:
+        return _standard_input()
     if is_generated(name_or_path):
         return f"family {plain_name(name_or_path)}".encode()
     path = group_path(name_or_path)

@@ -135,7 +135,11 @@ def _pair(value: Any, what: str, label: str) -> tuple[float, float]:
         raise ShapeError(f"{what} of {label}: give a number or a (low, high) pair, got {value!r}")
     if np.any(np.isnan(numbers)):
         raise NotFiniteError(f"{what} of {label}: NaN")
-    low, high = (-abs(numbers[0]), abs(numbers[0])) if len(numbers) == 1 else numbers
+    if len(numbers) == 1 and numbers[0] <= 0:
+        raise SteeringInputError(
+            f"{what} of {label}: {value!r} is the size of both limits: give a positive number, or a (low, high) pair"
+        )
+    low, high = (-numbers[0], numbers[0]) if len(numbers) == 1 else numbers
     if low >= high:
         raise SteeringInputError(f"{what} of {label}: the lower limit {low:g} is not below the upper one {high:g}")
     return float(low), float(high)

@@ -17,6 +17,7 @@ from lie_codegen.steering.feedback import feedback
 from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by
 from lie_codegen.steering.ocp.steered import asks_open, open_plan
+from lie_codegen.steering.options import check_options
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.start import placed, seen_from
 from lie_codegen.steering.task import make_task
@@ -221,6 +222,7 @@ def steer(
         }.items()
         if value is not None
     }
+    check_options(f"steer({group.name})", method, options)
     if asks_open(method, options):
         return open_plan(group, target, controls, duration, tolerance, **options)
     if isinstance(target, GoalSet) and method not in ("auto", "direct", "ocp"):
