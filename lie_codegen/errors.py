@@ -136,6 +136,10 @@ class NoCompilerWarning(UserWarning):
     """No C compiler was found: kernels are interpreted, with the same results, more slowly."""
 
 
+class CompilerWarning(UserWarning):
+    """A C compiler that was asked for cannot be used; names it, and the next is tried."""
+
+
 class CacheWarning(UserWarning):
     """The cache folder cannot be used; what is built lives in a private temporary folder."""
 

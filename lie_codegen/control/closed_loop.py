@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Never, overload
@@ -22,6 +23,7 @@ from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.patience import shows_progress
 
 _MOST_STEPS = 2**21
 _LARGEST_MOVE = 0.25
@@ -90,6 +92,7 @@ def closed_loop(
 ) -> Any: ...
 
 
+@shows_progress
 def closed_loop(
     group: GroupLike | None = None,
     *,
@@ -153,7 +156,7 @@ def closed_loop(
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
     if unknown:
-        known = set(closed_loop.__kwdefaults__ or {}) | {"t"}
+        known = set(inspect.signature(closed_loop).parameters) - {"unknown"}
         raise InputError(unknown_keywords("closed_loop", unknown, known))
     loop = {
         "values": values, "plant": plant, "plant_values": plant_values, "noise": noise, "delay": delay,

@@ -21,12 +21,14 @@ from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.patience import shows_progress
 
 _FOURTH_ORDER = ("rkmk4", "commutator_free")
 METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)
 _DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
+@shows_progress
 def simulate(
     group: GroupLike,
     u: Any,

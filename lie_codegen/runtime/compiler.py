@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from lie_codegen.errors import CompileError, NoCompilerWarning
+from lie_codegen.errors import CompileError, CompilerWarning, NoCompilerWarning
 
 #: -ffp-contract=off: the same numbers as the interpreter; never -ffast-math, which changes the whole process.
 #: No automatic vectorising: gcc 12.2 fuses multiply and add in it in spite of -ffp-contract=off (measured).
@@ -58,9 +58,12 @@ def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compil
     if variables.get("LIE_CODEGEN_CC", "").strip().lower() == "none":
         return ()
     found: dict[str, Compiler] = {}
+    asked = _asked(variables)
     for command in _ladder(variables):
         program = shutil.which(command[0], path=variables.get("PATH", ""))
         if program is None:
+            if command in asked:
+                warn_passed_over(shlex.join(command), "there is no such program (see $LIE_CODEGEN_CC, $CC)")
             continue
         extra = command[1:] if command[1:2] != ("-m",) else ()
         real = _zig_program() if command[1:2] == ("-m",) else os.path.realpath(program)
@@ -77,6 +80,12 @@ def warn_no_compiler() -> None:
         NoCompilerWarning,
         stacklevel=3,
     )
+
+
+@cache
+def warn_passed_over(command: str, why: str) -> None:
+    """Say once a process that a compiler is passed over; it may be the user's own choice, in $CC."""
+    warnings.warn(f"the C compiler {command!r} is passed over, {why}; the next is tried", CompilerWarning, stacklevel=3)
 
 
 def flags_for(statements: int) -> tuple[str, ...]:
@@ -128,14 +137,21 @@ def is_working(compiler: Compiler, folder: Path) -> bool:
     return True
 
 
-def _ladder(variables: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
+def _asked(variables: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
+    """The commands that the user asks for."""
+    found = []
     for name in ("LIE_CODEGEN_CC", "CC"):
         try:
             words = tuple(shlex.split(variables.get(name, "")))
         except ValueError:
             words = ()
         if words:
-            yield words
+            found.append(words)
+    return tuple(found)
+
+
+def _ladder(variables: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
+    yield from _asked(variables)
     yield from (("cc",), ("gcc",), ("clang",))
     if sys.executable and importlib.util.find_spec("ziglang") is not None:
         yield (sys.executable, "-m", "ziglang", "cc")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CompileError
 from lie_codegen.runtime import cache
-from lie_codegen.runtime.compiler import Compiler, compile_library, is_working
+from lie_codegen.runtime.compiler import Compiler, compile_library, is_working, warn_passed_over
 
 _SUFFIX = ".so"
 
@@ -55,4 +56,6 @@ def first_that_works(
                 if is_working(compiler, probe):
                     raise
             failure = failure or error
+            if number + 1 < len(compilers):
+                warn_passed_over(shlex.join(compiler.command), "it cannot compile the smallest program")
     raise failure or CompileError("no compiler to try")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Never
 
@@ -11,6 +12,7 @@ from lie_codegen.errors import SteeringInputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords
+from lie_codegen.runtime.patience import shows_progress
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.front import asks_direct, direct_plan
 from lie_codegen.steering.feedback import feedback
@@ -23,6 +25,7 @@ from lie_codegen.steering.start import placed, seen_from
 from lie_codegen.steering.task import make_task
 
 
+@shows_progress
 def steer(
     group: GroupLike,
     target: Any,
@@ -165,7 +168,7 @@ def steer(
     """
     group = as_group(group, "steer")
     if unknown:
-        known = set(steer.__kwdefaults__ or {})
+        known = set(inspect.signature(steer).parameters) - {"unknown"}
         raise SteeringInputError(unknown_keywords(f"steer({group.name})", unknown, known))
     options = {
         name: value

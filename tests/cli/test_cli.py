@@ -180,3 +180,15 @@ def test_a_usage_error_is_one_line_that_names_the_help(cli) -> None:
 def test_json_has_no_nan(cli) -> None:
     done = cli("average", "h3", "--u", "cos(t)", "--u", "sin(t)", "--u", "0", "--order", "3", "--check", "--json")
     json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+
+
+def test_manners_of_the_command_line(tmp_path: Path) -> None:
+    done = run("--version")
+    assert done.stdout.strip() == f"lie-codegen {lie_codegen.__version__}"
+    assert "Usage" in run("-h").stdout
+    (tmp_path / "target.csv").write_text("1 0 0\n0, 0, -1\n0 1 0\n")
+    by_file = run("steer", "SO(3)", "--target", str(tmp_path / "target.csv"), "--controls", "w1,w2")
+    assert "endpoint error" in by_file.stdout
+    refused = run("steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--picture", "plan.xyz", check=False)
+    assert refused.returncode == 2
+    assert len(refused.stderr.strip().splitlines()) == 1
