@@ -63,6 +63,12 @@ def spectral_pattern(matrices: Sequence[sp.MatrixBase]) -> tuple[ColumnPattern, 
 
 
 class _Family:
+    """The family at random points modulo a prime near 2^61.
+
+    A polynomial identity that fails is true at such a point by chance only, with probability of about degree / prime
+    (Schwartz and Zippel); ranks and zeros are thus found by integer arithmetic instead of symbols.
+    """
+
     def __init__(self, matrices: Sequence[sp.MatrixBase]) -> None:
         self.size = int(matrices[0].rows)
         self.entries = [

@@ -100,6 +100,11 @@ def is_module(name: str) -> bool:
     return PACKAGE.joinpath(*name.split(".")[1:]).with_suffix(".py").is_file()
 
 
+def test_the_type_of_arrays_is_one() -> None:
+    own = [path for path in FILES if "\nArray = " in path.read_text(encoding="utf-8")]
+    assert own == [PACKAGE / "arrays.py"], "import lie_codegen.arrays.Array"
+
+
 def test_the_front_door_is_importable_and_documented() -> None:
     for name in lie_codegen.__all__:
         value = getattr(lie_codegen, name)

@@ -128,15 +128,18 @@ def _curvature(
     group, size = structure.group, structure.size
     (theta, T, K, ad), (moved, carried) = turning, moving
     weights = ca.vertcat(*[ca.dot(lam, pushed(group, moved, A)) for A in group.basis])
+    # lam . dX_next = weights . J(Theta) dTheta, so the gradient by Theta is J^T weights: Horner's rule on J's series.
     pulled = weights
     for order in range(_SLOPE_DEGREE, 1, -1):
         pulled = weights - (ad.T @ pulled) / order
+    # exp(xi) = 1 + xi + xi^2 / 2: the square, a matrix off the algebra, curves lam . X_next even where Theta is linear in w.
     twice = ca.SX(group.dim, group.dim)
     for i, j in combinations_with_replacement(range(group.dim), 2):
         A, B = group.basis[i], group.basis[j]
         if np.any(both := (A @ B + B @ A) / 2):
             twice[i, j] = twice[j, i] = ca.dot(lam, pushed(group, moved, both))
     bent = wedge(group, weights) @ ad
+    # The curvature of Theta itself, weighted by its gradient; that is held fixed, for its own change is in the other terms.
     fixed = ca.SX.sym("fixed", group.dim)
     q = at.w[size:]
     second = ca.substitute(ca.hessian(ca.dot(fixed, theta), q)[0], fixed, pulled)
