@@ -189,6 +189,8 @@ def test_manners_of_the_command_line(tmp_path: Path) -> None:
     (tmp_path / "target.csv").write_text("1 0 0\n0, 0, -1\n0 1 0\n")
     by_file = run("steer", "SO(3)", "--target", str(tmp_path / "target.csv"), "--controls", "w1,w2")
     assert "endpoint error" in by_file.stdout
-    refused = run("steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--picture", "plan.xyz", check=False)
+    refused = run(
+        "steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--picture", "plan.xyz", check=False
+    )
     assert refused.returncode == 2
     assert len(refused.stderr.strip().splitlines()) == 1
