@@ -15,9 +15,26 @@ from lie_codegen.steering.closed_form.swing_twist import swing_twist
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.transcribe import transcription
 
 Method = Callable[..., Plan]
+
+
+class _Transcription:
+    """The method "transcription", whose module, and with it CasADi, is imported when it is asked for: shooting needs none."""
+
+    @property
+    def method(self) -> Method:
+        from lie_codegen.steering.transcription.transcribe import transcription
+
+        return transcription
+
+    @property
+    def __kwdefaults__(self) -> dict[str, Any]:
+        return dict(self.method.__kwdefaults__ or {})
+
+    def __call__(self, task: Task, **options: Any) -> Plan:
+        return self.method(task, **options)
+
 
 OPEN_LOOP: Mapping[str, Method] = {
     "four_phase": four_phase,
@@ -27,7 +44,7 @@ OPEN_LOOP: Mapping[str, Method] = {
     "area_rule": area_rule,
     "loops": loops,
     "optimal": optimal,
-    "transcription": transcription,
+    "transcription": _Transcription(),
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +15,12 @@ from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputErro
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.goals import Pointing, Position
-from lie_codegen.steering.ocp.front import ocp
-from lie_codegen.steering.ocp.problem import OptimalControlProblem
 from lie_codegen.steering.ocp.problem_data import Affine
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Controls, Plan, Status
+
+if TYPE_CHECKING:
+    from lie_codegen.steering.ocp.problem import OptimalControlProblem
 
 #: Options that no other method has.
 _OWN = {"cost", "terminal_cost", "constraints", "parameters"}
@@ -183,6 +184,8 @@ def _problem(
     limits = _thawed(bounds)
     if isinstance(limits, Mapping):
         limits = _by_label(group, controls, limits)
+    from lie_codegen.steering.ocp.front import ocp  # and with it CasADi, which steering by shooting does without
+
     return ocp(
         group,
         controls=controls,
