@@ -58,8 +58,10 @@ from .control import tracking_region as tracking_region
 
 # flow
 from .flow import Event as Event
+from .flow import Propagator as Propagator
 from .flow import Trajectory as Trajectory
 from .flow import distance as distance
+from .flow import propagator as propagator
 from .flow import second_kind as second_kind
 from .flow import simulate as simulate
 
@@ -144,6 +146,7 @@ from .rigid_body import solve_actual as solve_actual
 from .rigid_body import solve_averaged as solve_averaged
 
 # signals
+from .signals import ParametricInput as ParametricInput
 from .signals import PeriodicInput as PeriodicInput
 from .signals import SampledInput as SampledInput
 

@@ -124,4 +124,77 @@ static inline void exponent4(const V a[ORDERS][WORK], V *omega)
     EACH(k, WORK) { omega[k] = (a[0][k] + a[2][k] * (1.0 / 12)) + first[k] * (1.0 / 12); }
 }
 
+/* [dx, y] + [x, dy]. */
+static inline void both(const V *x, const V *dx, const V *y, const V *dy, V *z)
+{
+    V other[WORK];
+    BRACKET(dx, y, z);
+    BRACKET(x, dy, other);
+    EACH(k, WORK) { z[k] += other[k]; }
+}
+
+/* The derivative of exponent8 along da, every bracket by the product rule, from the stages that were kept. */
+static inline void tangent8(const V a[ORDERS][WORK], const V da[ORDERS][WORK], const Stages *st, V *domega)
+{
+    V dx1[WORK], dy1[WORK], ds1[WORK], dw1[WORK], dr1[WORK], dx[WORK], dy[WORK], ds2[WORK], dt2[WORK], dr2[WORK], ds3[WORK];
+    EACH(k, WORK) {
+        dx1[k] = da[0][k] + da[2][k] * (1.0 / 28);
+        dy1[k] = da[1][k] + da[3][k] * (3.0 / 28);
+    }
+    both(st->x1, dx1, st->y1, dy1, ds1);
+    EACH(k, WORK) {
+        ds1[k] *= 1.0 / 28;
+        dw1[k] = ds1[k] - da[2][k] * (1.0 / 14);
+    }
+    both(a[0], da[0], st->w1, dw1, dr1);
+    EACH(k, WORK) {
+        dr1[k] *= -1.0 / 3;
+        dx[k] = dx1[k] + ds1[k];
+        dy[k] = dy1[k] + dr1[k];
+    }
+    both(st->x2, dx, st->y2, dy, ds2);
+    both(a[1], da[1], st->s1, ds1, dt2);
+    EACH(k, WORK) {
+        ds2[k] = -ds2[k];
+        dt2[k] = -dt2[k];
+        dx[k] = da[0][k] + 1.25 * ds1[k];
+        dy[k] = 2.0 * da[2][k] + ds2[k] + 0.5 * dt2[k];
+    }
+    both(st->x3, dx, st->y3, dy, dr2);
+    EACH(k, WORK) {
+        dr2[k] = -dr2[k];
+        dx[k] = da[0][k] + da[2][k] * (1.0 / 12) - ds1[k] * (7.0 / 3) - ds2[k] * (1.0 / 6);
+        dy[k] = -9.0 * da[1][k] - 2.25 * da[3][k] + 63.0 * dr1[k] + dr2[k];
+    }
+    both(st->x4, dx, st->y4, dy, ds3);
+    EACH(k, WORK) { domega[k] = (da[0][k] + da[2][k] * (1.0 / 12)) - ds2[k] * (7.0 / 120) - ds3[k] * (1.0 / 360); }
+}
+
+/*
+ * eta = X^-1 dX over a step: Ad(exp(-Omega)) eta + rjac(Omega) dOmega. Since Ad(exp(-Omega)) = 1 - rjac(Omega) ad(Omega), one
+ * series serves both: eta + rjac(Omega) (dOmega - [Omega, eta]), rjac(Omega) y = sum_k (-ad(Omega))^k y / (k + 1)!.
+ */
+static inline void carry(const V *omega, const V *domega, V *eta)
+{
+    V term[WORK], next[WORK];
+    BRACKET(omega, eta, next);
+    EACH(k, WORK) {
+        term[k] = domega[k] - next[k];
+        eta[k] += term[k];
+    }
+    for (int j = 2; j < 40; ++j) {
+        V size = splat(0.0), whole = splat(0.0);
+        BRACKET(omega, term, next);
+        EACH(k, WORK) {
+            term[k] = next[k] * (-1.0 / j);
+            eta[k] += term[k];
+            size += term[k] * term[k];
+            whole += eta[k] * eta[k];
+        }
+        if (!(largest(size) > 1e-36 * largest(whole))) {
+            break;
+        }
+    }
+}
+
 #endif

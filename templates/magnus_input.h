@@ -4,7 +4,7 @@
 
 /* Strides in doubles from one trajectory to the next; 0 where all share. */
 typedef struct {
-    ptrdiff_t rates, wave_stride;
+    ptrdiff_t rates, wave_stride, rate_stride;
     const double *rate, *rate_low;         /* w_f and what rounding left of it */
     const double *cosines, *sines;         /* rates x DIM */
     const double *times;                   /* ends of the pieces; NULL without */
@@ -31,6 +31,7 @@ typedef struct {
 /* What eight lanes know of u; `waves` and `lines` lie in the workspace. */
 typedef struct {
     V *cosines, *sines; /* rates x DIM */
+    V *rate, *rate_low;
     V *weights;         /* rates x ORDERS: k_1 .. k_4 of w h */
     V *left, *slope;    /* DIM each */
     V *series;          /* terms x DIM */
@@ -89,7 +90,7 @@ static void set_weights(const Input *u, Source *source, int lane, double h)
     }
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
         double k[ORDERS];
-        wave_weights(u->rate[f] * h, k);
+        wave_weights(source->rate[f][lane] * h, k);
         EACH(i, ORDERS) { source->weights[f * ORDERS + i][lane] = k[i]; }
     }
     source->h[lane] = h;
@@ -177,8 +178,8 @@ static inline void generators(const Input *u, const Source *source, V middle, V 
         EACH(i, DIM) { a[j][i] = splat(0.0); }
     }
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
-        const V rate = splat(u->rate[f]), angle = rate * middle, *k = source->weights + f * ORDERS;
-        const V rest = fused(rate, middle, -angle) + (u->rate_low[f] * middle + rate * low);
+        const V rate = source->rate[f], angle = rate * middle, *k = source->weights + f * ORDERS;
+        const V rest = fused(rate, middle, -angle) + (source->rate_low[f] * middle + rate * low);
         V c, s;
         cos_sin(angle, rest, &c, &s);
         EACH(i, DIM) {

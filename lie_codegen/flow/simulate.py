@@ -102,7 +102,7 @@ def simulate(
         X, grid, error = refined(
             step, read, scale, start, times, rtol=goal, atol=atol, name=group.name, threads=threads
         )
-        run = MagnusRun(X, 4, 0, grid.steps, grid.largest_step, error + drive.error)
+        run = MagnusRun(X, 4, 0, grid.steps, grid.largest_step, 0.0, error + drive.error)
     elif steps is None:
         run = magnus_run(group, drive, times, start, order=order, rtol=goal, atol=atol, threads=threads)
     else:

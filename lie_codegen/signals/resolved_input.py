@@ -19,6 +19,9 @@ _AT = np.concatenate([_NODES, _CHECKS])
 #: From values at the nodes to coefficients, c_k = (2k + 1)/2 sum_g w_g P_k(x_g) u_g, and from those to the checks.
 _TO_SERIES = ((np.arange(TERMS) + 0.5)[:, None] * np.polynomial.legendre.legvander(_NODES, TERMS - 1).T) * _WEIGHTS
 _TO_CHECKS = np.polynomial.legendre.legvander(_CHECKS, TERMS - 1)
+#: |P_k'| is at most k (k + 1)/2; the share of a piece beyond its outermost node.
+_GROWTH = np.arange(TERMS) * (np.arange(TERMS) + 1) / 2
+_MARGIN = float(1 - _NODES[-1]) / 2
 #: The widest gap between the nodes, of a piece of length 1: a piece is at most this many `resolution`s long.
 WIDEST_GAP = float(np.max(np.diff(_NODES))) / 2
 LONGEST_PIECE = 5.88
@@ -104,18 +107,18 @@ def resolve_function(
     left = np.concatenate([np.linspace(a, b, c + 1)[:-1] for a, b, c in zip(ends[:-1], ends[1:], counts, strict=True)])
     right = np.append(left[1:], end)
     _check_repeatable(u, left, right, where)
-    done: list[tuple[Array, Array, Array]] = []
-    evaluations, error, pieces, widest = 0, 0.0, len(left), 0.0
+    state = _Pieces(np.empty(0), np.empty(0), np.empty((0, TERMS, 0)), np.empty(0))
+    evaluations, pieces = 0, len(left)
     while len(left):
         values = _read(u, left, right, where)
         evaluations += values.shape[0] * values.shape[1]
         series = np.einsum("kg,pgi->pki", _TO_SERIES, values[:, :TERMS])
         missed = np.max(np.abs(_TO_CHECKS @ series - values[:, TERMS:]), axis=(1, 2))
         good = _is_resolved(series, missed, left, right, tolerance / length, tolerance)
-        done.append((left[good], right[good], series[good]))
-        error += float(np.sum((missed * (right - left))[good]))
-        widest = max(widest, float(np.max((right - left)[good], initial=0.0)))
+        state = state.with_more(left[good], right[good], series[good], missed[good])
         bad_left, bad_right = left[~good], right[~good]
+        if not len(bad_left):
+            state, bad_left, bad_right = state.without_torn(inside, tolerance)
         middle = bad_left + (bad_right - bad_left) / 2
         pieces += len(middle)
         if pieces > _MOST_PIECES:
@@ -125,12 +128,55 @@ def resolve_function(
                 "loosen rtol"
             )
         left, right = np.concatenate([bad_left, middle]), np.concatenate([middle, bad_right])
-    lefts, series = np.concatenate([each[0] for each in done]), np.concatenate([each[2] for each in done])
-    order = np.argsort(lefts)
-    times = np.append(lefts[order], end)
-    short = times[:-1][np.diff(times) < _SHORT * length]
-    corners = np.union1d(inside, short)
-    return ResolvedInput(times, np.ascontiguousarray(series[order]), WIDEST_GAP * widest, evaluations, error, corners)
+    widths = state.right - state.left
+    error = float(np.sum(state.missed * widths))
+    corners = np.union1d(inside, state.left[widths < _SHORT * length])
+    times = np.append(state.left, end)
+    resolution = WIDEST_GAP * float(np.max(widths))
+    return ResolvedInput(times, np.ascontiguousarray(state.series), resolution, evaluations, error, corners)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Pieces that agree with u where it was read, in the order of time."""
+
+    left: Array
+    right: Array
+    series: Array
+    missed: Array
+
+    def with_more(self, left: Array, right: Array, series: Array, missed: Array) -> _Pieces:
+        """These and further ones."""
+        before = self.series if len(self.left) else series[:0]
+        a, b = np.concatenate([self.left, left]), np.concatenate([self.right, right])
+        order = np.argsort(a)
+        both, misses = np.concatenate([before, series]), np.concatenate([self.missed, missed])
+        return _Pieces(a[order], b[order], both[order], misses[order])
+
+    def without_torn(self, breakpoints: Array, tolerance: float) -> tuple[_Pieces, Array, Array]:
+        """Those that meet their neighbours, and the ends of those that do not: a corner lies between the last node and the end.
+
+        The nodes leave out 1.6 % of a piece at either end. What hides there shows as a gap between neighbours, and costs at
+        most the gap times that much time.
+        """
+        ends = np.sum(self.series[:-1], axis=1)  # P_k(1) = 1
+        starts = np.einsum("k,pki->pi", (-1.0) ** np.arange(TERMS), self.series[1:])
+        gap = np.max(np.abs(ends - starts), axis=1, initial=0.0)
+        widths = self.right - self.left
+        wide = np.maximum(widths[:-1], widths[1:])
+        torn = (gap * _MARGIN * wide > 1e-2 * tolerance) & ~np.isin(self.right[:-1], breakpoints)
+        # Rounding of u and t, and what the series leave out (less than their last term), are no gap.
+        size = np.max(np.abs(self.series), axis=2)
+        slope = 2 / widths * np.sum(size * _GROWTH, axis=1)
+        noise = 4e-15 * np.sum(size, axis=1) + 1e-15 * slope * np.maximum(np.abs(self.left), np.abs(self.right))
+        noise += 10 * (size[:, -1] + self.missed)
+        torn &= gap > noise[:-1] + noise[1:]
+        bad = np.zeros(len(widths), dtype=bool)
+        bad[:-1] |= torn & (widths[:-1] >= 0.5 * wide)
+        bad[1:] |= torn & (widths[1:] >= 0.5 * wide)
+        bad &= widths > 8 * np.spacing(np.maximum(np.abs(self.left), np.abs(self.right)))
+        kept = _Pieces(self.left[~bad], self.right[~bad], self.series[~bad], self.missed[~bad])
+        return kept, self.left[bad], self.right[bad]
 
 
 def _is_resolved(
@@ -138,7 +184,7 @@ def _is_resolved(
 ) -> NDArray[np.bool_]:
     """Which pieces are good: by their values, to what rounding of u and t allows, or because they are too short to count."""
     size = np.max(np.abs(series), axis=2)
-    slope = 2 / (right - left) * np.sum(size * np.arange(TERMS) * (np.arange(TERMS) + 1) / 2, axis=1)
+    slope = 2 / (right - left) * np.sum(size * _GROWTH, axis=1)
     scale = np.sum(size, axis=1)
     rounding = 2e-15 * scale + 4.5e-16 * slope * np.maximum(np.abs(left), np.abs(right))
     allowed = np.maximum(rate, rounding)

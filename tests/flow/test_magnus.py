@@ -127,6 +127,14 @@ def test_jumps_and_corners_are_found_without_being_named(method: str) -> None:
     np.testing.assert_allclose(run.X[-1], expm(0.3 * x) @ expm(area * y), rtol=0, atol=1e-10)
 
 
+def test_a_corner_beside_the_end_of_a_piece_is_found() -> None:
+    """A corner between the outermost node of a piece and its end is no node's business: the neighbours do not meet."""
+    h3 = lc.group("h3")
+    for corner in (0.5 + 1e-6, 0.5 - 3e-6, 0.5 + 2e-5):
+        run = lc.simulate(h3, lambda t, c=corner: np.array([abs(t - c), 0, 0]), t=[0.0, 1.0], rtol=1e-13)
+        assert run.X[-1, 0, 1] == pytest.approx((corner**2 + (1 - corner) ** 2) / 2, abs=3e-14)
+
+
 @pytest.mark.parametrize("name", ["so3", "se3", "su2", "sl2"])
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
 def test_the_error_estimate_is_honest(name: str, rtol: float) -> None:

@@ -203,7 +203,7 @@ def test_texts_where_numbers_belong_are_named() -> None:
         with pytest.raises(InputError, match=words):
             lc.simulate(so3, u, **named)
     for call in (
-        lambda: lc.simulate("so3", np.zeros(3), t=[0, 1]),
+        lambda: lc.simulate(3, np.zeros(3), t=[0, 1]),
         lambda: lc.average("so3", lc.PeriodicInput(["cos(t)"], period="2*pi")),
         lambda: lc.steer("so3", np.zeros(3), controls=("w1", "w2"), duration=1),
         lambda: lc.wei_norman("so3"),

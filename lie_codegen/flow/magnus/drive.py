@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ class Drive:
 
     Attributes:
         formula: zero waves and no pieces under a function.
+        rates, rates_low: (F,) of its waves, or (N, F) where each of N trajectories has its own.
         series: (m, terms, n) Legendre coefficients on the pieces, or (0, 0, n).
         times: (m + 1,) ends of the pieces, straight or Legendre; empty without.
         factor: (1,), or (N,) of N trajectories.
@@ -29,6 +30,8 @@ class Drive:
     """
 
     formula: FormulaInput
+    rates: Array
+    rates_low: Array
     series: Array
     times: Array
     factor: Array
@@ -43,6 +46,10 @@ class Drive:
         """Number of Legendre coefficients of a piece; 0 under a formula."""
         return int(self.series.shape[1])
 
+    @property
+    def _fastest(self) -> float:
+        return self.formula.fastest if self.rates.ndim == 1 else float(np.max(np.abs(self.rates), initial=0.0))
+
     def values(self, moments: Array, lengths: Array, at: Array) -> Array:
         """factor u at the fractions `at` of steps: (k, points, n), or (N, k, points, n).
 
@@ -53,9 +60,15 @@ class Drive:
             x = (moments - self.times[piece])[:, None] + lengths[:, None] * at
             polynomials = np.polynomial.legendre.legvander(2 * x / np.diff(self.times)[piece, None] - 1, self.terms - 1)
             total = np.einsum("kpj,kji->kpi", polynomials, self.series[piece])
+        elif self.rates.ndim == 2:
+            rows = [self._alone(k).values(moments, lengths, at) for k in range(len(self.rates))]
+            total = np.stack(rows)
         else:
             total = self.formula.values(moments, lengths, at)
         return np.asarray(total * (self.factor[0] if self.many is None else self.factor[:, None, None, None]))
+
+    def _alone(self, k: int) -> FormulaInput:
+        return replace(self.formula.trajectory(k), rates=self.rates[k], rates_low=self.rates_low[k])
 
     def piece_of(self, moments: Array) -> NDArray[np.intp]:
         """The piece in which each time lies; 0 without pieces."""
@@ -82,14 +95,26 @@ class Drive:
         elif len(self.times):
             ends = np.maximum(size(self.formula.left), size(self.formula.right))
             total = total + (ends if ends.ndim == 1 else np.max(ends, axis=0))[pieces]
-        return np.asarray(np.maximum(factor * total, self.formula.fastest))
+        return np.asarray(np.maximum(factor * total, self._fastest))
 
 
 def formula_drive(formula: FormulaInput, factor: Array) -> Drive:
     """A Fourier series or straight pieces, times a number or (N,) numbers."""
     row, many = _row(factor)
     none = np.empty((0, 0, formula.dim))
-    return Drive(formula, none, formula.times, row, formula.trajectories or many, 0.0, 0, 0.0, formula.times)
+    return Drive(
+        formula,
+        formula.rates,
+        formula.rates_low,
+        none,
+        formula.times,
+        row,
+        formula.trajectories or many,
+        0.0,
+        0,
+        0.0,
+        formula.times,
+    )
 
 
 def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
@@ -98,7 +123,7 @@ def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
     none, empty = np.empty((0, u.series.shape[-1])), np.empty(0)
     nothing = FormulaInput(empty, empty, none, none, empty, none, none)
     error = float(np.max(np.abs(row))) * u.error
-    return Drive(nothing, u.series, u.times, row, many, u.resolution, u.evaluations, error, u.corners)
+    return Drive(nothing, empty, empty, u.series, u.times, row, many, u.resolution, u.evaluations, error, u.corners)
 
 
 def _row(factor: Array) -> tuple[Array, int | None]:

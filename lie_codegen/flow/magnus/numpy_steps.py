@@ -32,11 +32,17 @@ def exponent(group: MatrixGroup, a: Array, order: int) -> Array:
 
     Order 8 is Blanes, Casas and Ros, BIT 40 (2000) 434; from moments of four orders, a_2 of three is a_2 + 3 a_4 / 20.
     """
-    constants = group.algebra.structure_constants.reshape(-1, group.dim)
+    return exponent_of(group.algebra.structure_constants, a, order)
+
+
+def exponent_of(structure: Array, a: Array, order: int) -> Array:
+    """The same from (n, n, n) structure constants."""
+    n = len(structure)
+    constants = structure.reshape(n * n, n)
 
     def c(x: Array, y: Array) -> Array:
         outer = x[..., :, None] * y[..., None, :]
-        return np.asarray(-(outer.reshape(*outer.shape[:-2], group.dim**2) @ constants))
+        return np.asarray(-(outer.reshape(*outer.shape[:-2], n * n) @ constants))
 
     a1, a2, a3, a4 = (a[..., j, :] for j in range(4))
     if order == 8:

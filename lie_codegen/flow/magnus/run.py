@@ -32,7 +32,7 @@ class MagnusRun:
         order: 4, 6 or 8.
         multiple: how many times the coarsest steps were divided.
         steps: the number of steps.
-        longest: the longest of them.
+        longest, shortest: of them.
         error_estimate: of the entries of X: from the runs with longer steps, and what reading u left out.
     """
 
@@ -41,6 +41,7 @@ class MagnusRun:
     multiple: int
     steps: int
     longest: float
+    shortest: float
     error_estimate: float
 
 
@@ -91,7 +92,9 @@ def magnus_run(
         goal = max(rtol * scale, atol)
         floor = 4e-16 * scale * np.sqrt(steps.count)
         if estimate <= max(goal, floor):
-            return MagnusRun(fine, order, multiple, steps.count, steps.longest, estimate + drive.error * scale)
+            return MagnusRun(
+                fine, order, multiple, steps.count, steps.longest, steps.shortest, estimate + drive.error * scale
+            )
         # The next run should reach half the goal; it is at least half as fine again, so that the two can be compared.
         needed = (estimate / max(goal / 2, floor)) ** (1 / order)
         before, coarse, trust = multiple, fine, order
@@ -109,7 +112,7 @@ def fixed_run(
     parts = np.maximum(np.ceil(widths / (times[-1] - times[0]) * steps * (1 - 1e-12)), 1).astype(np.intp)
     chosen = Steps(planned.knots, parts, planned.piece, planned.slot, planned.slots)
     X = _finite(flow(group, drive, chosen, order, X0, threads), f"simulate({group.name})")
-    return MagnusRun(X, order, 1, chosen.count, chosen.longest, float("nan"))
+    return MagnusRun(X, order, 1, chosen.count, chosen.longest, chosen.shortest, float("nan"))
 
 
 def gram_of(group: MatrixGroup) -> Array:

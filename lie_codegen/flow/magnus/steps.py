@@ -47,6 +47,11 @@ class Steps:
         """The longest step."""
         return float(np.max(np.diff(self.knots) / self.parts))
 
+    @property
+    def shortest(self) -> float:
+        """The shortest step."""
+        return float(np.min(np.diff(self.knots) / self.parts))
+
     def times(self, factor: int) -> Steps:
         """The same with so many times as many steps."""
         return Steps(self.knots, self.parts * factor, self.piece, self.slot, self.slots)

@@ -1,0 +1,269 @@
+"""lc.propagator: X(T; p) of X' = X hat(u(t; p)), X(0) = 1, with its exact derivatives in p, in batches, and its powers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.arrays import Array
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.flow.inputs import as_drive, as_signal
+from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.flow.magnus.run import MagnusRun, magnus_run, order_for
+from lie_codegen.flow.magnus.tangents import tangents
+from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive
+from lie_codegen.flow.simulate import check_tolerance
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.signals.parametric_input import ParametricInput
+
+_LARGEST_POWER = 10**12
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """X(T; p) at one p.
+
+    Attributes:
+        X: (d, d).
+        error_estimate: of its entries.
+        steps: number of steps.
+        duration: T.
+        parameters: name -> value.
+        dX: (m, d, d) dX/dp in the order of the parameters: the exact derivative of what the steps compute, so that Newton's
+            method on it converges to rounding.
+        eta: (m, n) X^-1 dX/dp in the algebra.
+    """
+
+    X: Array
+    error_estimate: float
+    steps: int
+    duration: float
+    parameters: dict[str, float]
+    _of: Propagator = field(repr=False)
+    _finest: int = field(repr=False)
+
+    def __repr__(self) -> str:
+        at = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
+        return (
+            f"Propagation({self._of.group.name}, duration={self.duration:.6g}{', ' if at else ''}{at}, {self.steps} steps, "
+            f"error_estimate={self.error_estimate:.2g})"
+        )
+
+    @cached_property
+    def dX(self) -> Array:
+        """(m, d, d); see the class."""
+        u, group = self._of.u, self._of.group
+        if not isinstance(u, ParametricInput):
+            return np.zeros((0, *self.X.shape), self.X.dtype)
+        found = tangents(group, u, self.parameters, self.duration, self._finest)
+        if self._of.duration == "period":  # dX/dT = X hat(u(T))
+            slopes = u.period_of(tuple(self.parameters.values()))[1]
+            found = found + slopes[:, None, None] * (self.X @ group.hat(u(self.duration, **self.parameters)))
+        return found
+
+    @cached_property
+    def eta(self) -> Array:
+        """(m, n); see the class."""
+        return np.asarray(self._of.group.project(np.linalg.solve(self.X, self.dX)))
+
+    def power(self, n: int) -> Power:
+        """X(n T) = X(T)^n of a periodic input; see `Propagator.power`."""
+        return self._of._power(self, n)
+
+
+@dataclass(frozen=True, eq=False)
+class Power:
+    """X(T)^n.
+
+    Attributes:
+        X: (d, d).
+        n: the power.
+        error_estimate: n times that of one period and of rounding it: M^n cannot be known better than n |dM|.
+    """
+
+    X: Array
+    n: int
+    error_estimate: float
+
+    def __repr__(self) -> str:
+        return f"Power(n={self.n}, error_estimate={self.error_estimate:.2g})"
+
+
+@dataclass(frozen=True, eq=False)
+class PropagationBatch:
+    """X(T; p) at N values of p.
+
+    Attributes:
+        X: (N, d, d).
+        error_estimate: of the entries of all.
+        steps: of each, the same for all.
+    """
+
+    X: Array
+    error_estimate: float
+    steps: int
+
+    def __repr__(self) -> str:
+        return f"PropagationBatch({len(self.X)} members, {self.steps} steps, error_estimate={self.error_estimate:.2g})"
+
+
+@dataclass(frozen=True, eq=False)
+class Propagator:
+    """U(a=.5, ...).X; see `propagator`.
+
+    Attributes:
+        group: the group.
+        u: the input.
+        duration: T, or "period".
+        rtol: the tolerance.
+        resolution: of a u that is no sum of sines and cosines, as in `simulate`.
+    """
+
+    group: MatrixGroup
+    u: Any
+    duration: float | str
+    rtol: float
+    resolution: float | None = None
+
+    def __repr__(self) -> str:
+        names = ", ".join(getattr(self.u, "parameters", ()))
+        return f"Propagator({self.group.name}, duration={self.duration!r}, parameters=({names}), rtol={self.rtol:g})"
+
+    def __call__(self, **parameters: float) -> Propagation:
+        """X(T; p).
+
+        Raises:
+            InputError: a parameter missing or unknown; others as `simulate`.
+        """
+        where = f"propagator({self.group.name})"
+        if isinstance(self.u, ParametricInput):
+            values = self.u.values(parameters)
+            length = self.u.period_of(values)[0] if self.duration == "period" else float(self.duration)
+            named = dict(zip(self.u.parameters, values, strict=True))
+            drive = parametric_drive(self.u, values, length, self.rtol, self.resolution, where)
+        else:
+            if parameters:
+                raise InputError(f"{where}: no parameter {next(iter(parameters))!r}; the input has none")
+            length, named = self._fixed_length(), {}
+            t = np.array([0.0, length])
+            drive = as_drive(
+                self.group,
+                as_signal(self.group, self.u, t),
+                np.array(1.0),
+                t,
+                rtol=self.rtol,
+                resolution=self.resolution,
+            )
+        run = self._run(drive, length, self._one)
+        finest = max(run.steps, int(np.ceil(length / run.shortest * (1 - 1e-9))))
+        return Propagation(run.X[0], run.error_estimate, run.steps, length, named, self, finest)
+
+    def batch(self, *, threads: int = 1, **parameters: ArrayLike) -> PropagationBatch:
+        """X(T; p) where any of the parameters are (N,) arrays and the others numbers, eight at a time on lanes.
+
+        Raises:
+            InputError: a parameter missing or unknown, a duration that depends on them.
+            ShapeError: arrays of different lengths.
+        """
+        where = f"propagator({self.group.name})"
+        if not isinstance(self.u, ParametricInput):
+            raise InputError(f"{where}: the input has no parameters; give a lc.ParametricInput")
+        values = self.u.values(parameters, many=True)
+        counts = sorted({len(value) for value in values if isinstance(value, np.ndarray)})
+        if len(counts) > 1:
+            raise ShapeError(f"{where}: the parameters have lengths {', '.join(map(str, counts))}; give one N")
+        count = counts[0] if counts else 1
+        if self.duration == "period":
+            lengths = {
+                self.u.period_of(row)[0] for row in zip(*(np.broadcast_to(v, count) for v in values), strict=True)
+            }
+            if len(lengths) > 1:
+                raise InputError(f"{where}: the period differs from member to member; call them one by one")
+            length = lengths.pop()
+        else:
+            length = float(self.duration)
+        drives = parametric_batch(self.u, values, count, length, self.rtol, self.resolution, where)
+        runs = [self._run(drive, length, self._one, threads) for drive in drives]
+        X = np.concatenate([run.X[0] if run.X.ndim == 4 else run.X for run in runs])
+        return PropagationBatch(X, max(run.error_estimate for run in runs), max(run.steps for run in runs))
+
+    def power(self, n: int, **parameters: float) -> Power:
+        """X(n T) = X(T)^n of a periodic input over one period, with its error.
+
+        Squared and multiplied in extended precision, so that the error is that of X(T), n times.
+
+        Raises:
+            InputError: n is no integer from 0 to 10^12, or the duration is not "period".
+        """
+        return self._power(self(**parameters), n)
+
+    def _power(self, one: Propagation, n: int) -> Power:
+        if self.duration != "period":
+            raise InputError(f'propagator({self.group.name}): powers are of one period; give duration="period"')
+        if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 0 <= n <= _LARGEST_POWER:
+            raise InputError(f"propagator({self.group.name}).power: n is an integer from 0 to 10^12, given {n!r}")
+        wide = np.clongdouble if one.X.dtype.kind == "c" else np.longdouble
+        result, square, left = np.eye(len(one.X), dtype=wide), one.X.astype(wide), int(n)
+        while left:
+            if left & 1:
+                result = result @ square
+            square = square @ square
+            left >>= 1
+        X = result.astype(one.X.dtype)
+        growth = max(1.0, float(np.max(np.abs(X))))
+        return Power(X, int(n), int(n) * (one.error_estimate + 2.2e-16) * growth)
+
+    @property
+    def _one(self) -> Array:
+        return np.eye(self.group.degree, dtype=complex if self.group.is_complex else float)
+
+    def _fixed_length(self) -> float:
+        return float(self.u.T) if self.duration == "period" else float(self.duration)
+
+    def _run(self, drive: Drive, length: float, start: Array, threads: int = 1) -> MagnusRun:
+        times, order = np.array([0.0, length]), order_for("auto", self.rtol)
+        return magnus_run(self.group, drive, times, start, order=order, rtol=self.rtol, threads=threads)
+
+
+def propagator(
+    group: GroupLike,
+    u: Any,
+    *,
+    duration: float | str,
+    rtol: float = 1e-11,
+    resolution: float | None = None,
+) -> Propagator:
+    """U with U(a=.5, w=1.1).X = X(T; p): the flow X' = X hat(u(t; p)) from the identity over [0, T].
+
+    The steps of the group are compiled once; parameters are inputs. `.dX` are exact derivatives, by
+    eta <- Ad(exp(-Omega)) eta + rjac(Omega) dOmega at every step, dOmega the derivative of the Magnus formula.
+
+    Args:
+        group: a group, a catalogue name or a group file.
+        u: a lc.ParametricInput; or any input of `simulate`, without parameters.
+        duration: T, or "period" of a periodic input.
+        rtol: as in `simulate`.
+        resolution: as in `simulate`, for a u that is no sum of sines and cosines.
+
+    Raises:
+        InputError: a duration that is not positive, or "period" of an input that is not periodic.
+        ShapeError: u has not one component for each basis element.
+    """
+    G = as_group(group, "propagator")
+    where = f"propagator({G.name})"
+    goal = check_tolerance(where, rtol, 0.0, None)
+    if isinstance(u, ParametricInput) and u.dim != G.dim:
+        raise ShapeError(f"{where}: u has {u.dim} components; the algebra has {G.dim}")
+    if duration == "period":
+        if getattr(u, "period", None) is None:
+            raise InputError(
+                f"{where}: the input has no period; give lc.ParametricInput(..., period='2*pi/w') or a number"
+            )
+    elif isinstance(duration, str) or not (np.isfinite(duration) and duration > 0):
+        raise InputError(f'{where}: duration is {duration!r}; give a positive number, or "period"')
+    return Propagator(G, u, duration, goal, resolution)
