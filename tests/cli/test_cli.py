@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from command_line import Done
 
+from lie_codegen import __version__
 from lie_codegen.cli.app import main
 
 
@@ -182,15 +183,13 @@ def test_json_has_no_nan(cli) -> None:
     json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
-def test_manners_of_the_command_line(tmp_path: Path) -> None:
-    done = run("--version")
-    assert done.stdout.strip() == f"lie-codegen {lie_codegen.__version__}"
-    assert "Usage" in run("-h").stdout
+def test_manners_of_the_command_line(cli, tmp_path: Path) -> None:
+    done = cli("--version")
+    assert done.stdout.strip() == f"lie-codegen {__version__}"
+    assert "Usage" in cli("-h").stdout
     (tmp_path / "target.csv").write_text("1 0 0\n0, 0, -1\n0 1 0\n")
-    by_file = run("steer", "SO(3)", "--target", str(tmp_path / "target.csv"), "--controls", "w1,w2")
+    by_file = cli("steer", "SO(3)", "--target", str(tmp_path / "target.csv"), "--controls", "w1,w2")
     assert "endpoint error" in by_file.stdout
-    refused = run(
-        "steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--picture", "plan.xyz", check=False
-    )
+    refused = cli("steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--picture", "plan.xyz")
     assert refused.returncode == 2
     assert len(refused.stderr.strip().splitlines()) == 1

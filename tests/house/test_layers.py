@@ -139,3 +139,29 @@ def test_every_gallery_target_is_a_function_with_a_docstring() -> None:
     for target in TARGETS:
         function = getattr(import_module(f"lie_codegen.gallery.{target.module}"), target.name)
         assert function.__doc__, target.name
+
+
+def test_no_test_asks_the_product_which_tolerance_to_grant() -> None:
+    """atol, rtol, rel and abs of a comparison are numbers of the test, never names or attributes of the package."""
+    for path in sorted(Path(__file__).parents[1].rglob("test_*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        ours = {
+            alias.asname or alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lie_codegen")
+            for alias in node.names
+        }
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+            name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+            if name not in ("assert_allclose", "allclose", "isclose", "approx"):
+                continue
+            for keyword in call.keywords:
+                if keyword.arg not in ("atol", "rtol", "rel", "abs"):
+                    continue
+                granted = {node.id for node in ast.walk(keyword.value) if isinstance(node, ast.Name)} & ours
+                granted |= {
+                    node.attr
+                    for node in ast.walk(keyword.value)
+                    if isinstance(node, ast.Attribute) and node.attr in ("tolerance", "error_estimate", "rounding")
+                }
+                assert not granted, f"{path.name}:{call.lineno}: {keyword.arg} is {ast.unparse(keyword.value)}"
