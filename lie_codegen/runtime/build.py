@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import CacheError, CodegenError
 from lie_codegen.runtime import cache
-from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
-from lie_codegen.runtime.cache_upkeep import evict
+from lie_codegen.runtime.cache_door import compiled_entry, request_key
+from lie_codegen.runtime.cache_folder import usable_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, warn_no_compiler
-from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
+from lie_codegen.runtime.digests import cpu_identity, digest
 from lie_codegen.runtime.extension import prepare_extension
-from lie_codegen.runtime.ladder import compile_entry, first_that_works
+from lie_codegen.runtime.ladder import compile_entry
 from lie_codegen.runtime.lane_library import ONE_LANE, keep_sources
 from lie_codegen.runtime.library import Library, check_names
 
@@ -86,11 +86,7 @@ def build_sources(
                 return library
     sources = make_sources()
     check_names(sources.signatures)
-    try:
-        return _compile(folder, sources, compilers, requests)
-    except OSError as error:
-        reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
-        return _compile(temporary_folder(reason), sources, compilers, requests)
+    return _compile(folder, sources, compilers, requests)
 
 
 def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:
@@ -125,25 +121,14 @@ def _namespace(given: str | None, kernels: Sequence[Kernel]) -> str:
 
 
 def _request(namespace: str | None, definition: str, options: Mapping[str, Any], compiler: Compiler) -> str:
-    return digest(
-        {
-            "namespace": namespace,
-            "definition": definition,
-            "options": dict(options),
-            "package": package_digest(),
-            "templates": templates_digest(),
-            "versions": versions(),
-            "flags": flags_for(0),
-            "compiler": compiler.identity,
-            "cpu": cpu_identity(),
-        }
-    )
+    return request_key(compiler, flags_for(0), namespace=namespace, definition=definition, options=dict(options))
 
 
 def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler], requests: Sequence[str]) -> Library:
     flags = flags_for(sources.statements)
 
-    def attempt(number: int, compiler: Compiler) -> cache.Entry:
+    def attempt(folder: Path, number: int, compiler: Compiler) -> cache.Entry:
+        # The C text itself is the key: another request for the same text, from another version, compiles nothing.
         key = digest(
             {
                 "files": dict(sources.files),
@@ -159,10 +144,7 @@ def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler
                 cache.store_request(folder, requests[number], key)
         return entry
 
-    entry = first_that_works(folder, compilers, attempt)
-    library = _open(entry)
-    evict(folder, keep=entry.library.parent.name)
-    return library
+    return _open(compiled_entry(folder, compilers, attempt))
 
 
 def _fill(folder: Path, key: str, sources: LibrarySources, compiler: Compiler, flags: tuple[str, ...]) -> cache.Entry:

@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from lie_codegen.runtime import cache
-from lie_codegen.runtime.cache_folder import temporary_folder, usable_folder
-from lie_codegen.runtime.cache_upkeep import evict
+from lie_codegen.runtime.cache_door import compiled_entry, request_key
+from lie_codegen.runtime.cache_folder import usable_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers, warn_no_compiler
-from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
-from lie_codegen.runtime.ladder import compile_entry, first_that_works
+from lie_codegen.runtime.ladder import compile_entry
 
 #: Multiplications and additions may fuse here: an iterative solver has no bits to reproduce.
 SOLVER_FLAGS = ("-O2", "-march=native", "-std=c99", "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
@@ -47,42 +46,14 @@ def build_source(
         if entry is not None:
             return entry.library
     files = make_files()
-    try:
-        return _compile(folder, files, main, namespace, definition, compilers, flags)
-    except OSError as error:
-        reason = f"the cache folder {folder} cannot be written: {error.strerror or error}"
-        return _compile(temporary_folder(reason), files, main, namespace, definition, compilers, flags)
 
-
-def _key(compiler: Compiler, namespace: str, definition: str, flags: tuple[str, ...]) -> str:
-    return digest(
-        {
-            "source": namespace,
-            "definition": definition,
-            "package": package_digest(),
-            "templates": templates_digest(),
-            "versions": versions(),
-            "flags": flags,
-            "compiler": compiler.identity,
-            "cpu": cpu_identity(),
-        }
-    )
-
-
-def _compile(
-    folder: Path,
-    files: Mapping[str, str],
-    main: str,
-    namespace: str,
-    definition: str,
-    compilers: tuple[Compiler, ...],
-    flags: tuple[str, ...],
-) -> Path:
-    def attempt(number: int, compiler: Compiler) -> cache.Entry:
+    def attempt(folder: Path, _: int, compiler: Compiler) -> cache.Entry:
         key = _key(compiler, namespace, definition, flags)
         with cache.lock(folder, key):
             return cache.find_entry(folder, key) or compile_entry(folder, key, files, main, namespace, compiler, flags)
 
-    entry = first_that_works(folder, compilers, attempt)
-    evict(folder, keep=entry.library.parent.name)
-    return entry.library
+    return compiled_entry(folder, compilers, attempt).library
+
+
+def _key(compiler: Compiler, namespace: str, definition: str, flags: tuple[str, ...]) -> str:
+    return request_key(compiler, flags, source=namespace, definition=definition)

@@ -1,0 +1,55 @@
+"""The one way into the cache for something to compile: by which key it is known, and what happens where it is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.runtime import cache
+from lie_codegen.runtime.cache_folder import temporary_folder
+from lie_codegen.runtime.cache_upkeep import evict
+from lie_codegen.runtime.compiler import Compiler
+from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
+from lie_codegen.runtime.ladder import first_that_works
+
+
+def request_key(compiler: Compiler, flags: tuple[str, ...], **asked: Any) -> str:
+    """Digest of what was asked for and of all that may change the answer: this package, its versions, compiler, processor."""
+    return digest(
+        {
+            **asked,
+            "package": package_digest(),
+            "templates": templates_digest(),
+            "versions": versions(),
+            "flags": flags,
+            "compiler": compiler.identity,
+            "cpu": cpu_identity(),
+        }
+    )
+
+
+def compiled_entry(
+    folder: Path, compilers: Sequence[Compiler], attempt: Callable[[Path, int, Compiler], cache.Entry]
+) -> cache.Entry:
+    """The entry that `attempt` (folder, number of the compiler, compiler) finds or makes with the first compiler that works.
+
+    Where the cache cannot be written a temporary folder takes its place; what is over the cache's limit is evicted.
+
+    Raises:
+        CompileError: a compiler that works refuses the text.
+        CacheError: there is no folder to build in.
+    """
+    try:
+        entry = _attempted(folder, compilers, attempt)
+    except OSError as error:
+        folder = temporary_folder(f"the cache folder {folder} cannot be written: {error.strerror or error}")
+        entry = _attempted(folder, compilers, attempt)
+    evict(folder, keep=entry.library.parent.name)
+    return entry
+
+
+def _attempted(
+    folder: Path, compilers: Sequence[Compiler], attempt: Callable[[Path, int, Compiler], cache.Entry]
+) -> cache.Entry:
+    return first_that_works(folder, compilers, lambda number, compiler: attempt(folder, number, compiler))
