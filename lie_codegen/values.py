@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping
-from dataclasses import Field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, fields, is_dataclass
+from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,18 +13,24 @@ import numpy as np
 #: Lines and characters of a printed value.
 _LINES, _WIDTH = 10, 110
 _FEW = 4
+_ENTRIES = 6
 
 
 class Value:
     """Base of frozen dataclasses (declared with eq=False and repr=False) whose fields are plain data, arrays among them.
 
     Two values are equal where they are of one class and all compared fields are: arrays by shape, type and entry, NaN equal to
-    itself. Equal values have equal hashes.
+    itself. Equal values have equal hashes. Pickles hold the fields alone: what is cached beside them is computed again.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
     def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
         if type(other) is not type(self):
             return NotImplemented
         return all(same(getattr(self, name), getattr(other, name)) for name in _compared(self))
@@ -36,14 +43,16 @@ class Value:
         one = f"{type(self).__name__}({', '.join(shown)})"
         if len(one) <= _WIDTH:
             return one
-        lines = [f"    {part}"[:_WIDTH] for part in shown]
+        lines = [f"    {part}" for part in shown]
         if len(lines) > _LINES - 2:
             lines = [*lines[: _LINES - 3], f"    and {len(lines) - _LINES + 3} more"]
         return "\n".join([f"{type(self).__name__}(", *lines, ")"])
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two plain values are equal, as one bool: arrays entry by entry, NaN equal to itself."""
+    """Whether two plain values are equal, as one bool: arrays entry by entry, dataclasses field by field, NaN equal to itself."""
+    if a is b:
+        return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         x, y = np.asarray(a), np.asarray(b)
         inexact = x.dtype.kind in "fc" and y.dtype.kind in "fc"
@@ -52,9 +61,9 @@ def same(a: Any, b: Any) -> bool:
         return a.keys() == b.keys() and all(same(value, b[key]) for key, value in a.items())
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
         return type(a) is type(b) and len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
-    if isinstance(a, float) and isinstance(b, float) and a != a and b != b:
-        return True
-    return bool(a == b)
+    if is_dataclass(a) and type(a) is type(b):
+        return all(same(getattr(a, name), getattr(b, name)) for name in _compared(a))
+    return bool(a == b) or (_is_nan(a) and _is_nan(b))
 
 
 def brief(value: Any) -> str:
@@ -65,10 +74,33 @@ def brief(value: Any) -> str:
         return f"<{value.dtype} {' x '.join(map(str, value.shape)) or 'scalar'}>"
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, Mapping):
+        return f"{{{_listed([f'{key}: {_inner(each)}' for key, each in value.items()])}}}"
+    if isinstance(value, list | tuple):
+        inside = _listed([_inner(each) for each in value])
+        return f"[{inside}]" if isinstance(value, list) else f"({inside})"
+    return _inner(value)
+
+
+def _inner(value: Any) -> str:
+    """A value within another one."""
+    if isinstance(value, np.ndarray | float | Enum):
+        return brief(value)
+    if isinstance(value, Mapping | list | tuple):
+        return f"<{type(value).__name__} of {len(value)}>"
     name = getattr(value, "name", None)
-    if isinstance(name, str) and not isinstance(value, str) and hasattr(value, "labels"):
+    if isinstance(name, str) and hasattr(value, "labels"):
         return name  # a group
-    return reprlib.repr(value).replace("\n", " ")
+    if is_dataclass(value):
+        return f"<{type(value).__name__}{f' {name}' if isinstance(name, str) else ''}>"
+    return " ".join(reprlib.repr(value).split())
+
+
+def _listed(entries: Sequence[str]) -> str:
+    shown = ", ".join(entries[:_ENTRIES])
+    return shown if len(entries) <= _ENTRIES else f"{shown}, and {len(entries) - _ENTRIES} more"
 
 
 def _compared(value: Any) -> list[str]:
@@ -83,7 +115,11 @@ def _hashed(value: Any) -> int:
     if isinstance(value, Mapping):
         return hash(frozenset((key, _hashed(each)) for key, each in value.items()))
     if isinstance(value, list | tuple):
-        return hash(tuple(_hashed(each) for each in value))
-    if isinstance(value, float) and value != value:
-        return hash("nan")
-    return hash(value)
+        return hash(tuple(map(_hashed, value)))
+    if is_dataclass(value) and not isinstance(value, Value | type):
+        return hash((type(value).__name__, *(_hashed(getattr(value, name)) for name in _compared(value))))
+    return hash("nan") if _is_nan(value) else hash(value)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float | complex) and bool(value != value)
