@@ -269,6 +269,7 @@ def test_the_package_compiles_strictly_and_its_example_is_content(real: str, tmp
     assert json.loads((again / "manifest.json").read_text()) == manifest
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMPILER is None or shutil.which("cmake") is None, reason="no C compiler or no cmake")
 def test_the_satellites_package_builds_with_cmake(tmp_path: Path) -> None:
     controller = lc.mpc(satellite())

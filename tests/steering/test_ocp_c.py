@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ocp_systems import car, quadrotor, satellite
+from ocp_systems import car, planar, quadrotor, satellite
 
 from lie_codegen.steering.ocp.source import CORE, render_solver, solver_view
 
@@ -61,18 +61,23 @@ def run(problem: Any, folder: Path, real: str, parameters: str, *flags: str) -> 
     return done.stdout.split()
 
 
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-sanitize=float-divide-by-zero")
+SYSTEMS = {
+    "car": (car, ", ".join(map(repr, planar(0.8, 3, 1).ravel().tolist())), 0.277507734),
+    "quadrotor": (quadrotor, "2, 0, 1, 1, 0.05, 0.4", 6.119001823),
+}
+
+
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
-def test_the_solver_is_strict_c99_and_clean_under_the_sanitizers(tmp_path: Path) -> None:
-    sanitizers = (
-        "-fsanitize=address,undefined",
-        "-fno-sanitize-recover=undefined",
-        "-fno-sanitize=float-divide-by-zero",
-    )
-    status, cost, _, _ = run(quadrotor(), tmp_path, "double", "2, 0, 1, 1, 0.05, 0.4", *STRICT, *sanitizers)
+@pytest.mark.parametrize("name", ["car", pytest.param("quadrotor", marks=pytest.mark.slow)])
+def test_the_solver_is_strict_c99_and_clean_under_the_sanitizers(name: str, tmp_path: Path) -> None:
+    make, parameters, expected = SYSTEMS[name]
+    status, cost, _, _ = run(make(), tmp_path, "double", parameters, *STRICT, *SANITIZERS)
     assert status == "0"
-    assert float(cost) == pytest.approx(6.119001823, rel=1e-9)
+    assert float(cost) == pytest.approx(expected, rel=2e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 def test_in_single_precision_it_finds_the_same_optimum(tmp_path: Path) -> None:
     status, cost, violation, _ = run(quadrotor(), tmp_path, "float", "2, 0, 1, 1, 0.05f, 0.4f", *STRICT)

@@ -12,7 +12,13 @@ from lie_codegen.gallery import open_control, open_problems
 
 @pytest.mark.parametrize(
     ("name", "cost"),
-    [("quadrotor", 6.119001823), ("satellite", None), ("parking", 1.422607742), ("underwater", None), ("qubit", None)],
+    [
+        pytest.param("quadrotor", 6.119001823, marks=pytest.mark.slow),
+        pytest.param("satellite", None, marks=pytest.mark.slow),
+        ("parking", 1.422607742),
+        pytest.param("underwater", None, marks=pytest.mark.slow),
+        ("qubit", None),
+    ],
 )
 def test_an_open_problem_is_solved_and_drawn(name: str, cost: float | None, tmp_path: Path) -> None:
     lines = inspect.getsource(getattr(open_problems, name)).splitlines()
