@@ -18,6 +18,8 @@ from lie_codegen.runtime.threads import share_out
 #: method -> order.
 ORDERS = {"magnus4": 4, "magnus6": 6, "magnus8": 8}
 MOST_STEPS = 2**26
+#: Steps in one call of the compiled loop, about a tenth of a second.
+_BLOCK = 2_000_000
 #: Steps of one trajectory, and trajectories, below which another thread costs more than it brings.
 _LEAST_STEPS, _LEAST_TRAJECTORIES = 4096, 32
 #: The steps are never made more than so many times shorter at once: far from convergence the estimate says little.
@@ -131,8 +133,21 @@ def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, 
         parts = share_out(lambda a, b: library.many(drive, steps, order, X0, a, b), many, threads, _LEAST_TRAJECTORIES)
         return np.ascontiguousarray(np.moveaxis(np.concatenate(parts), 0, 1))
     if threads == 1:
-        return library.one(drive, steps, order, X0, 0, steps.count)[0]
+        return _in_blocks(library, drive, steps, order, X0)
     return _over_time(library, drive, steps, order, X0, threads)
+
+
+def _in_blocks(library: MagnusLibrary, drive: Drive, steps: Steps, order: int, X0: Array) -> Array:
+    """One thread, block after block of steps: in between Python looks whether somebody pressed Ctrl-C."""
+    if steps.count <= _BLOCK:
+        return library.one(drive, steps, order, X0, 0, steps.count)[0]
+    found, before = np.zeros((steps.slots, *X0.shape), X0.dtype), X0
+    for first in range(0, steps.count, _BLOCK):
+        last = min(first + _BLOCK, steps.count)
+        X, before = library.one(drive, steps, order, before, first, last)
+        ends_here = (steps.first[1:] > first) & (steps.first[1:] <= last) & (steps.slot >= 0)
+        found[steps.slot[ends_here]] = X[steps.slot[ends_here]]
+    return found
 
 
 def _over_time(library: MagnusLibrary, drive: Drive, steps: Steps, order: int, X0: Array, threads: int) -> Array:
