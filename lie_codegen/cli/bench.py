@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def bench(
-    what: Annotated[str, typer.Argument(help='"" for everything that is timed, "steering", "control".')] = "",
+    what: Annotated[
+        str, typer.Argument(help='"" for everything that is timed, "steering", "control", "propagate".')
+    ] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
     only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
     json: Json = False,
@@ -28,8 +30,13 @@ def bench(
     if what == "control":
         _control(json)
         return
+    if what == "propagate":
+        _propagate(json)
+        return
     if what:
-        raise InputError(f'bench: nothing is called {what!r}; there are "steering", "control", or nothing for the rest')
+        raise InputError(
+            f'bench: nothing is called {what!r}; there are "steering", "control", "propagate", or nothing for the rest'
+        )
     from lie_codegen.benchmarks.run import bench as measure
 
     with progress("bench") as report:
@@ -51,6 +58,16 @@ def _control(json: bool) -> None:
     with progress("bench control") as report:
         rows = bench_control(say=report)
     emit(table(rows), {"rows": [asdict(row) for row in rows]}, json)
+
+
+def _propagate(json: bool) -> None:
+    from lie_codegen.benchmarks.propagate import bench_propagate, table
+
+    with progress("bench propagate") as report:
+        rows, missed = bench_propagate(report)
+    emit(table(rows, missed), {"rows": [asdict(row) for row in rows], "missed": missed}, json)
+    if missed:
+        raise typer.Exit(1)
 
 
 def _text(result: Bench) -> str:
