@@ -38,7 +38,7 @@
 #include "magnus_move.h"
 
 /* One step of every lane; keeps the largest squared |a_1|. */
-static inline void step(const Input *u, const Source *source, int order, V middle, V low, V h, const double *const *table,
+static __attribute__((noinline)) void step(const Input *u, const Source *source, int order, V middle, V low, V h, const double *const *table,
     V *state, V *most)
 {
     V a[ORDERS][DIM], omega[WORK], norm = splat(0.0);

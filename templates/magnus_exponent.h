@@ -5,7 +5,10 @@
 /* ---- matrices: real parts, then imaginary ones, ROWS x SIZE each; below are zeros ---- */
 
 /* z = x y; y's rows from ROWS on are zero. */
-static inline void multiply(const V *x, const V *y, V *z)
+#if MATRIX > 16
+__attribute__((noinline))
+#endif
+static void multiply(const V *x, const V *y, V *z)
 {
     EACH(i, ROWS) {
         EACH(j, SIZE) {
@@ -64,7 +67,10 @@ typedef struct {
 } Stages;
 
 /* Blanes, Casas and Ros, BIT 40 (2000) 434. */
-static inline void exponent8(const V a[ORDERS][WORK], Stages *st, V *omega)
+#if DIM > 6
+__attribute__((noinline))
+#endif
+static void exponent8(const V a[ORDERS][WORK], Stages *st, V *omega)
 {
     V s3[WORK];
     EACH(k, WORK) {
@@ -125,7 +131,10 @@ static inline void exponent4(const V a[ORDERS][WORK], V *omega)
 }
 
 /* [dx, y] + [x, dy]. */
-static inline void both(const V *x, const V *dx, const V *y, const V *dy, V *z)
+#if DIM > 6
+__attribute__((noinline))
+#endif
+static void both(const V *x, const V *dx, const V *y, const V *dy, V *z)
 {
     V other[WORK];
     BRACKET(dx, y, z);

@@ -120,7 +120,7 @@ static void enter(const Input *u, const Grid *grid, Source *source, int lane, pt
 }
 
 /* Tables of values at the nodes: the generators of eight steps, `table` pointing at each lane's own, `apart` from node to node. */
-static inline void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V a[ORDERS][DIM])
+static __attribute__((noinline)) void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V a[ORDERS][DIM])
 {
     for (ptrdiff_t g = 0; g < u->nodes; ++g) {
         EACH(i, DIM) {
@@ -138,7 +138,7 @@ static const double five_weight[5] = {0.28444444444444444, 0.23931433524968324, 
     0.11846344252809454};
 
 /* The generators of a Legendre series: those of each polynomial from its values at five nodes, times its coefficients. */
-static inline void from_series(const Input *u, const Source *source, V middle, V low, V h, V a[ORDERS][DIM])
+static __attribute__((noinline)) void from_series(const Input *u, const Source *source, V middle, V low, V h, V a[ORDERS][DIM])
 {
     const V centre = 2.0 * (((middle - source->start) + low) / source->width) - 1.0, reach = 2.0 * h / source->width;
     V before[5], now[5], x[5];

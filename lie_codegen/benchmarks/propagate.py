@@ -107,11 +107,11 @@ def _row(
 
 
 def _call(U: Propagator) -> Array:
-    return U(a=0.5, w=1.1).X
+    return np.asarray(U(a=0.5, w=1.1).X)
 
 
 def _end(G: MatrixGroup, u: PeriodicInput) -> Array:
-    return simulate(G, u, t=[0, 50.0]).X[-1]
+    return np.asarray(simulate(G, u, t=[0, 50.0]).X[-1])
 
 
 def _chain_group(qubits: int) -> MatrixGroup:
