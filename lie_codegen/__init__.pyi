@@ -103,6 +103,7 @@ from .groups import with_quaternion as with_quaternion
 from .kernel import Kernel as Kernel
 from .kernel import Port as Port
 from .kernel import kernel_factory as kernel_factory
+from .kernel import load as load
 
 # mechanics
 from .mechanics import MomentumWheels as MomentumWheels

@@ -3,3 +3,4 @@
 from .definition import kernel_factory as kernel_factory
 from .kernel import Kernel as Kernel
 from .kernel import Port as Port
+from .saved import load as load

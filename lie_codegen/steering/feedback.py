@@ -11,7 +11,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,11 +22,13 @@ from lie_codegen.errors import NotOnGroupError, ShapeError, SteeringError, Steer
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.flow.simulate import simulate
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.finish import energy
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by, solver_of
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.seeds import area_rule_seed
 from lie_codegen.steering.task import Task
+from lie_codegen.values import Value
 
 _SMALL_ENOUGH = 1.0
 #: A remainder that small is left to the area rule where the planner refuses it.
@@ -109,11 +111,13 @@ def feedback(
         method="feedback",
         u=_joined(parts, span, n),
         cost=spent,
-        X_final=X,
-        error=errors[-1],
-        status=Status.SOLVED if errors[-1] <= task.tolerance else Status.APPROXIMATE,
-        seconds={"all": time.perf_counter() - started},
-        details=details,
+        outcome=Facts(
+            X,
+            errors[-1],
+            Status.SOLVED if errors[-1] <= task.tolerance else Status.APPROXIMATE,
+            details,
+            {"all": time.perf_counter() - started},
+        ),
     )
 
 
@@ -131,13 +135,21 @@ def _planned(task: Task, planner: str, options: dict[str, Any]) -> Controls:
     size = float(np.linalg.norm(x))
     x = x if size <= _SMALL_ENOUGH else x * (_SMALL_ENOUGH / size)
 
-    def evaluate(t: Array) -> Array:
-        u = np.zeros((len(t), task.group.dim))
-        s = t / task.duration
-        u[:, list(task.controls)] = area_rule_seed(task.group, task.controls, x, s, 0.0) / task.duration
-        return u
+    seed = _Seed(task.group, task.controls, x)
+    return Controls(Stretched(task.group.dim, tuple(task.controls), seed, task.duration), ())
 
-    return Controls(evaluate, ())
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Seed(Value):
+    """The area rule's first guess over unit time for coordinates x."""
+
+    group: MatrixGroup
+    controls: tuple[int, ...]
+    x: Array
+
+    def __call__(self, s: Array) -> Array:
+        """(k,) -> (k, m)."""
+        return np.asarray(area_rule_seed(self.group, self.controls, self.x, s, 0.0))
 
 
 def _exponential(A: Array) -> Array:
@@ -146,15 +158,25 @@ def _exponential(A: Array) -> Array:
     return np.asarray(expm(A))
 
 
-def _joined(parts: list[Controls], span: float, n: int) -> Controls:
-    def evaluate(t: Array) -> Array:
-        place = np.clip((t / span).astype(int), 0, len(parts) - 1)
-        u = np.zeros((len(t), n))
-        for number, part in enumerate(parts):
+@dataclass(frozen=True, eq=False, repr=False)
+class _Joined(Value):
+    """Controls one after the other, each over a span of time."""
+
+    parts: tuple[Controls, ...]
+    span: float
+    n: int
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        place = np.clip((t / self.span).astype(int), 0, len(self.parts) - 1)
+        u = np.zeros((len(t), self.n))
+        for number, part in enumerate(self.parts):
             now = place == number
             if np.any(now):
-                u[now] = part(t[now] - number * span)
+                u[now] = part(np.clip(t[now] - number * self.span, 0.0, self.span))
         return u
 
+
+def _joined(parts: list[Controls], span: float, n: int) -> Controls:
     inner = [number * span + np.asarray(part.breakpoints) for number, part in enumerate(parts)]
-    return Controls(evaluate, np.sort(np.concatenate([*inner, span * np.arange(1, len(parts))])))
+    return Controls(_Joined(tuple(parts), span, n), np.sort(np.concatenate([*inner, span * np.arange(1, len(parts))])))

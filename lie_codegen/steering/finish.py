@@ -13,7 +13,8 @@ from numpy.polynomial.legendre import leggauss
 from lie_codegen.arrays import Array
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.flow.simulate import simulate
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 from lie_codegen.steering.task import Task
 
 _NODES, _WEIGHTS = leggauss(10)
@@ -30,6 +31,12 @@ def energy(u: Controls, duration: float) -> float:
     t = edges[:, None] + widths[:, None] * (1 + _NODES) / 2
     values = np.sum(u(t.ravel()) ** 2, axis=1).reshape(t.shape)
     return float(np.sum(values @ _WEIGHTS * widths / 2))
+
+
+def flown_end(group: MatrixGroup, u: Controls, duration: float, accuracy: float = 1e-11) -> Array:
+    """(d, d) where the true system ends."""
+    end: Array = simulate(group, u, t=[0.0, duration], tolerance=accuracy).X[-1]
+    return end
 
 
 def finish(
@@ -51,8 +58,7 @@ def finish(
     """
     started = time.perf_counter()
     if end is None:
-        velocity = u if drift is None else u.plus(drift)
-        end = simulate(task.group, velocity, t=[0.0, task.duration], tolerance=accuracy).X[-1]
+        end = flown_end(task.group, u if drift is None else u.plus(drift), task.duration, accuracy)
     error = distance(task.group, task.target, end)
     return Plan(
         group=task.group,
@@ -62,9 +68,11 @@ def finish(
         method=method,
         u=u,
         cost=energy(u, task.duration),
-        X_final=end,
-        error=error,
-        status=solved if error <= task.tolerance else otherwise,
-        seconds={**seconds, "simulate": time.perf_counter() - started},
-        details=details,
+        outcome=Facts(
+            end,
+            error,
+            solved if error <= task.tolerance else otherwise,
+            details,
+            {**seconds, "simulate": time.perf_counter() - started},
+        ),
     )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Never
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.errors import SteeringInputError
+from lie_codegen.flow.metric import admitted_element
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords
@@ -226,6 +229,22 @@ def steer(
         if value is not None
     }
     check_options(f"steer({group.name})", method, options)
+    plan = _planned(group, target, controls, duration, method, tolerance, options)
+    if isinstance(target, GoalSet) or np.shape(target) != (group.degree, group.degree):
+        return plan
+    distance = admitted_element(group, target, f"steer({group.name}): target").projected
+    return replace(plan, projected=distance) if distance else plan
+
+
+def _planned(
+    group: MatrixGroup,
+    target: Any,
+    controls: Sequence[Any],
+    duration: float,
+    method: str,
+    tolerance: float,
+    options: dict[str, Any],
+) -> Plan:
     if asks_open(method, options):
         return open_plan(group, target, controls, duration, tolerance, **options)
     if isinstance(target, GoalSet) and method not in ("auto", "direct", "ocp"):

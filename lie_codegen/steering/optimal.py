@@ -11,20 +11,24 @@ from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.steering.finish import finish
-from lie_codegen.steering.plan import Controls, Plan, PlanOnDemand, Status
+from lie_codegen.flow.metric import distance
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.finish import energy, flown_end
+from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import SOLVED, Extremals
 from lie_codegen.steering.shooting.shooter import Shooter, shooter
 from lie_codegen.steering.task import Task
+from lie_codegen.values import Value
 
 _MORE = 10
 #: A cheapest extremal that no more starts than these found is searched for again (SL(2): 4 of 60 were not the cheapest, then none).
@@ -88,59 +92,93 @@ def _plan(
     task: Task, solver: Shooter, found: Extremals, weights: Array, tried: tuple[str, ...], seconds: dict[str, float]
 ) -> Plan:
     """The plan; the energy of an extremal is constant in time, so that with equal weights its cost is known."""
-    extremal = cache(lambda: solver.extremal(found.mu0[0], weights=weights))
-    u = extremal_controls(task, extremal)
-    known = {"cost": float(found.cost[0]) / task.duration} if np.all(weights == 1) else {}
-
-    def examine() -> Plan:
-        return _examined(task, solver, found, weights, tried, seconds, extremal(), u)
-
-    return PlanOnDemand(
-        examine,
+    u = extremal_controls(task, found.mu0[0], weights)
+    outcome = Shot(
+        controls=task.controls,
+        tolerance=task.tolerance,
+        weights=weights,
+        mu0=found.mu0[0],
+        weighted_cost=float(found.cost[0]) / task.duration,
+        residual=float(found.residual[0]),
+        counts=tuple(int(each[0]) for each in (found.starts, found.converged, found.agreeing, found.linearisations)),
+        tried=tried,
+        seconds=seconds,
+    )
+    return Plan(
         group=task.group,
         target=task.target,
         controls=tuple(task.group.labels[i] for i in task.controls),
         duration=task.duration,
         method="optimal",
         u=u,
-        **known,
+        cost=outcome.weighted_cost if np.all(weights == 1) else energy(u, task.duration),
+        outcome=outcome,
     )
 
 
-def _examined(
-    task: Task,
-    solver: Shooter,
-    found: Extremals,
-    weights: Array,
-    tried: tuple[str, ...],
-    seconds: dict[str, float],
-    extremal: Extremal,
-    u: Controls,
-) -> Plan:
-    started = time.perf_counter()
-    singular = extremal.singular_values()
-    conjugate = extremal.conjugate_times()
-    ratio = extremal.conjugacy()
-    taken = {**seconds, "examine": time.perf_counter() - started}
-    details = {
-        "winner": "shooting on the Lie-Poisson equations" + ("" if solver.compiled else ", in numpy (no C compiler)"),
-        "tried": tried,
-        "starts": int(found.starts[0]),
-        "converged": int(found.converged[0]),
-        "agreeing": int(found.agreeing[0]),
-        "linearisations": int(found.linearisations[0]),
-        "costate": found.mu0[0] / task.duration,
-        "weights": weights,
-        "weighted_cost": float(found.cost[0]) / task.duration,
-        "residual": float(found.residual[0]),
-        "singular_values": singular,
-        "conjugate_target": ratio < _CONJUGATE,
-        "conjugate_times": tuple(t * task.duration for t in conjugate),
-        "optimality": _optimality(int(found.starts[0]), int(found.agreeing[0]), ratio, conjugate),
-        "discretisation": "none: the extremal is exact to rounding",
-        "extremal": extremal,
-    }
-    return finish(task, "optimal", u, details, taken, solved=Status.LOCAL, otherwise=Status.NOT_CONVERGED)
+@dataclass(frozen=True, eq=False, repr=False)
+class Shot(Value):
+    """What the shooting found; the true system is flown, and conjugate points are looked for, when that is first read: both
+    take a hundred times as long as the solution itself, and who steers in a loop reads the controls alone.
+
+    Attributes:
+        controls, tolerance, weights: of the task.
+        mu0: (n,) the costate of unit time.
+        weighted_cost: int sum_i w_i u_i^2.
+        residual: of the solver.
+        counts: starts, converged, agreeing, linearisations.
+        tried: what was tried, in words.
+        seconds: spent so far.
+    """
+
+    controls: tuple[int, ...]
+    tolerance: float
+    weights: Array
+    mu0: Array
+    weighted_cost: float
+    residual: float
+    counts: tuple[int, ...]
+    tried: tuple[str, ...]
+    seconds: Mapping[str, float] = field(compare=False)
+
+    def of(self, plan: Plan) -> Facts:
+        """The facts of the plan."""
+        started = time.perf_counter()
+        extremal = _extremal(plan.group, self.controls, tuple(self.mu0.tolist()), tuple(self.weights.tolist()))
+        singular = extremal.singular_values()
+        conjugate = extremal.conjugate_times()
+        ratio = extremal.conjugacy()
+        examined = time.perf_counter()
+        starts, converged, agreeing, linearisations = self.counts
+        compiled = shooter(plan.group, self.controls).compiled
+        details = {
+            "winner": "shooting on the Lie-Poisson equations" + ("" if compiled else ", in numpy (no C compiler)"),
+            "tried": self.tried,
+            "starts": starts,
+            "converged": converged,
+            "agreeing": agreeing,
+            "linearisations": linearisations,
+            "costate": self.mu0 / plan.duration,
+            "weights": self.weights,
+            "weighted_cost": self.weighted_cost,
+            "residual": self.residual,
+            "singular_values": singular,
+            "conjugate_target": ratio < _CONJUGATE,
+            "conjugate_times": tuple(t * plan.duration for t in conjugate),
+            "optimality": _optimality(starts, agreeing, ratio, conjugate),
+            "discretisation": "none: the extremal is exact to rounding",
+            "extremal": extremal,
+        }
+        end = flown_end(plan.group, plan.u, plan.duration)
+        error = distance(plan.group, plan.target, end)
+        seconds = {**self.seconds, "examine": examined - started, "simulate": time.perf_counter() - examined}
+        return Facts(end, error, self._status(error, conjugate), details, seconds)
+
+    def _status(self, error: float, conjugate: tuple[float, ...]) -> Status:
+        """An extremal with a conjugate point inside is no local minimum, however well it ends."""
+        if error > self.tolerance:
+            return Status.NOT_CONVERGED
+        return Status.EXTREMAL if conjugate else Status.LOCAL
 
 
 def _optimality(starts: int, agreeing: int, ratio: float, conjugate: tuple[float, ...]) -> str:
@@ -160,12 +198,29 @@ def _optimality(starts: int, agreeing: int, ratio: float, conjugate: tuple[float
     )
 
 
-def extremal_controls(task: Task, extremal: Callable[[], Extremal]) -> Controls:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExtremalControls(Value):
+    """The controls of an extremal over unit time: (k,) -> (k, m)."""
+
+    group: MatrixGroup
+    controls: tuple[int, ...]
+    mu0: Array
+    weights: Array
+
+    def __call__(self, s: Array) -> Array:
+        """(k,) -> (k, m)."""
+        extremal = _extremal(self.group, self.controls, tuple(self.mu0.tolist()), tuple(self.weights.tolist()))
+        return extremal.control(np.clip(s, 0, 1))
+
+
+@lru_cache(maxsize=256)
+def _extremal(
+    group: MatrixGroup, controls: tuple[int, ...], mu0: tuple[float, ...], weights: tuple[float, ...]
+) -> Extremal:
+    return shooter(group, controls).extremal(mu0, weights=weights)
+
+
+def extremal_controls(task: Task, mu0: Array, weights: Array) -> Controls:
     """The controls of an extremal, slowed down to the task's duration."""
-
-    def evaluate(t: Array) -> Array:
-        u = np.zeros((len(t), task.group.dim))
-        u[:, list(task.controls)] = extremal().control(np.clip(t / task.duration, 0, 1)) / task.duration
-        return u
-
-    return Controls(evaluate, ())
+    unit = ExtremalControls(task.group, task.controls, np.array(mu0, dtype=float), np.array(weights, dtype=float))
+    return Controls(Stretched(task.group.dim, tuple(task.controls), unit, task.duration), ())

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved, json_value, table_text
+from lie_codegen.values import Value
+
+#: Times beyond the ends, relative to the duration, that are rounding.
+_ROUNDING = 1e-9
 
 
 class Status(Enum):
@@ -20,6 +29,9 @@ class Status(Enum):
     SOLVED = "solved: the endpoint error is below the tolerance"
     APPROXIMATE = "approximate: the method reaches the target up to its own order; see .error"
     LOCAL = "solved: a local minimum of the objective, the best of the starts tried; more starts may find a better one"
+    EXTREMAL = (
+        "solved: an extremal with a conjugate point inside, so no local minimum; more starts may find a better one"
+    )
     NOT_FOUND = "not found: the nearest of the starts tried, see .violation; that none exists is not proved"
     NOT_CONVERGED = "not converged: the best found is returned, see .error; more starts may find more"
 
@@ -31,41 +43,155 @@ class Status(Enum):
         return self.value
 
 
-class Controls:
+class Law(Protocol):
+    """u(t) as plain data: a frozen record that is called with (k,) times and gives (k, n)."""
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Controls(Value):
     """u(t) on all n components (zeros where there is no control), for a float or an array of times.
 
     Attributes:
+        law: what is evaluated, plain data.
         breakpoints: times at which u is not smooth.
+        duration: u is known on [0, duration]; None where it is at all times.
     """
 
-    def __init__(self, evaluate: Callable[[Array], Array], breakpoints: ArrayLike) -> None:
-        self._evaluate = evaluate
-        self.breakpoints = np.asarray(breakpoints, dtype=float)
+    law: Law
+    breakpoints: Any = ()
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "breakpoints", np.asarray(self.breakpoints, dtype=float))
 
     def __call__(self, t: ArrayLike) -> Array:
-        """u at t: (n,) for a number, (k, n) for (k,) times."""
+        """u at t: (n,) for a number, (k, n) for (k,) times.
+
+        Raises:
+            NotFiniteError: a time is NaN or infinite.
+            InputError: a time is outside [0, duration].
+        """
         times = np.asarray(t, dtype=float)
-        values = self._evaluate(np.atleast_1d(times))
+        values = self.law(self._inside(np.atleast_1d(times)))
         return values[0] if times.ndim == 0 else values
+
+    def _inside(self, times: Array) -> Array:
+        if not np.all(np.isfinite(times)):
+            raise NotFiniteError("u(t): a time is NaN or infinite")
+        if self.duration is None or not times.size:
+            return times
+        slack = _ROUNDING * self.duration
+        first, last = float(np.min(times)), float(np.max(times))
+        if first < -slack or last > self.duration + slack:
+            outside = first if first < -slack else last
+            raise InputError(f"u(t) is known on [0, {self.duration:g}]; t = {outside:g} is outside")
+        return np.clip(times, 0.0, self.duration)
+
+    def over(self, duration: float) -> Controls:
+        """The same, known on [0, duration] alone."""
+        return replace(self, duration=float(duration))
 
     def scaled(self, factor: Array) -> Controls:
         """factor * u(t), component by component."""
-        return Controls(lambda t: self._evaluate(t) * factor, self.breakpoints)
+        return replace(self, law=Scaled(self.law, factor))
 
     def plus(self, drift: Array) -> Controls:
         """u(t) + drift."""
-        return Controls(lambda t: self._evaluate(t) + drift, self.breakpoints)
+        return replace(self, law=Shifted(self.law, drift))
 
 
-@dataclass(frozen=True)
-class Plan:
-    """A manoeuvre.
+@dataclass(frozen=True, eq=False, repr=False)
+class Scaled(Value):
+    """factor * law(t)."""
+
+    law: Law
+    factor: Any
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        return np.asarray(self.law(t) * self.factor)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Shifted(Value):
+    """law(t) + drift."""
+
+    law: Law
+    drift: Any
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        return np.asarray(self.law(t) + self.drift)
+
+
+class UnitLaw(Protocol):
+    """Controls over unit time as plain data: (k,) numbers in [0, 1] -> (k, m)."""
+
+    def __call__(self, s: Array) -> Array:
+        """(k,) -> (k, m)."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stretched(Value):
+    """m controls over unit time, slowed down to a duration and set among n components: u(t) = unit(t/T)/T."""
+
+    n: int
+    controls: tuple[int, ...]
+    unit: UnitLaw
+    duration: float
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        u = np.zeros((len(t), self.n))
+        u[:, list(self.controls)] = self.unit(t / self.duration) / self.duration
+        return u
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Facts(Value):
+    """What is known of a plan once its end was simulated and its extremal examined.
+
+    Attributes:
+        X_final: where the true system ends.
+        error: |log(target^-1 X_final)|.
+        status: see `Status`.
+        details: what the method adds.
+        seconds: wall time spent, by stage; of no account in comparisons.
+    """
+
+    X_final: Array
+    error: float
+    status: Status
+    details: Mapping[str, Any]
+    seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+    def of(self, plan: Plan) -> Facts:
+        """Itself."""
+        return self
+
+
+class Outcome(Protocol):
+    """The facts of a plan, or what they follow from: plain data."""
+
+    def of(self, plan: Plan) -> Facts:
+        """The facts of the plan."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Saved):
+    """A manoeuvre: plain data. Facts that take longer to find than the plan itself (the end of the true system, conjugate
+    points) are found when first read.
 
     Attributes:
         group, target, controls, duration: the task; controls are the labels of the actuated basis elements.
         method: the method that made it.
-        u: u(t) -> (n,), vectorised.
+        u: u(t) -> (n,), vectorised, on [0, duration].
         cost: int_0^duration |u|^2 dt; of objective="fuel" int sum_i w_i |u_i| dt.
+        projected: Frobenius distance from the target that was given to `target`, its projection onto the group; 0.0 where
+            it was on the group.
         X_final: where the true system ends.
         error: |log(target^-1 X_final)|, on SO(3) the attitude error in rad.
         status: see `Status`.
@@ -73,18 +199,49 @@ class Plan:
         details: what the method adds (its parameters, starts tried, discretisation).
     """
 
-    group: MatrixGroup = field(repr=False)
-    target: Array = field(repr=False)
+    group: MatrixGroup
+    target: Array
     controls: tuple[str, ...]
     duration: float
     method: str
-    u: Controls = field(repr=False)
+    u: Controls
     cost: float
-    X_final: Array = field(repr=False)
-    error: float
-    status: Status
-    seconds: Mapping[str, float]
-    details: Mapping[str, Any]
+    outcome: Outcome = field(repr=False)
+    projected: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.u.duration != self.duration:
+            object.__setattr__(self, "u", self.u.over(self.duration))
+
+    @cached_property
+    def facts(self) -> Facts:
+        """All that is not known at once."""
+        return self.outcome.of(self)
+
+    @property
+    def X_final(self) -> Array:
+        """(d, d) where the true system ends."""
+        return self.facts.X_final
+
+    @property
+    def error(self) -> float:
+        """|log(target^-1 X_final)|, Euclidean in the basis."""
+        return self.facts.error
+
+    @property
+    def status(self) -> Status:
+        """How the plan ended."""
+        return self.facts.status
+
+    @property
+    def seconds(self) -> Mapping[str, float]:
+        """Wall time spent, by stage."""
+        return self.facts.seconds
+
+    @property
+    def details(self) -> Mapping[str, Any]:
+        """What the method adds."""
+        return self.facts.details
 
     @property
     def violation(self) -> Mapping[str, float]:
@@ -92,39 +249,61 @@ class Plan:
         known: Mapping[str, float] = self.details.get("violation", {"end": self.error})
         return known
 
+    def X(self, t: ArrayLike) -> Array:
+        """(d, d) at a time, (k, d, d) at (k,) times: the true system under u, from where the plan starts.
+
+        Raises:
+            InputError: a time is outside [0, duration].
+        """
+        from lie_codegen.flow.simulate import simulate
+
+        times = np.asarray(t, dtype=float)
+        self.u(times.ravel())  # refuses times outside
+        start = self.details.get("start")
+        knots, place = np.unique(np.append(times.ravel(), [0.0, self.duration]), return_inverse=True)
+        drift = self.details.get("drift")
+        velocity = self.u if drift is None else self.u.plus(np.asarray(drift, dtype=float))
+        path = simulate(self.group, velocity, t=knots, X0=start).X
+        found: Array = path[place[: times.size]].reshape(*times.shape, *path.shape[1:])
+        return found
+
+    def to_csv(self, path: str | Path | None = None, *, t: ArrayLike | None = None) -> str:
+        """The controls as a table: t and one column a component; at 101 equal times if `t` is not given. Written where a path is
+        given; returned as a text in any case."""
+        times = np.linspace(0.0, self.duration, 101) if t is None else np.atleast_1d(np.asarray(t, dtype=float))
+        values = self.u(times)
+        text = table_text({"t": times, **{f"u_{label}": values[:, i] for i, label in enumerate(self.group.labels)}})
+        if path is not None:
+            Path(path).write_text(text, encoding="utf-8")
+        return text
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """All facts of the plan and its controls at 101 times as JSON, for other programs (`save` and `lc.load` keep the plan)."""
+        times = np.linspace(0.0, self.duration, 101)
+        record = {
+            "group": self.group.name,
+            "labels": self.group.labels,
+            "target": self.target,
+            "controls": self.controls,
+            "duration": self.duration,
+            "method": self.method,
+            "cost": self.cost,
+            "error": self.error,
+            "status": self.status,
+            "projected": self.projected,
+            "X_final": self.X_final,
+            "details": self.details,
+            "t": times,
+            "u": self.u(times),
+        }
+        text = json.dumps(json_value(record), indent=1)
+        if path is not None:
+            Path(path).write_text(text, encoding="utf-8")
+        return text
+
     def inputs(self, t: ArrayLike) -> Array:
         """What each control does: (m,) at a time, (k, m) at (k,) times; u(t) = sum_i inputs_i b_i(t), without the drift."""
         made = self.details.get("inputs")
         if made is not None:
             return np.asarray(made(t))
         return np.asarray(self.u(t)[..., [self.group.labels.index(label) for label in self.controls]])
-
-
-class PlanOnDemand(Plan):
-    """A plan whose end is simulated, and whose extremal is examined, when one of the results is first read.
-
-    Both take a hundred times as long as the solution itself, and who steers in a loop reads the controls alone.
-    """
-
-    def __init__(self, examine: Callable[[], Plan], **known: Any) -> None:
-        """`known`: the fields that are at hand; `examine` gives the whole plan."""
-        for name, value in {**known, "_examine": examine}.items():
-            object.__setattr__(self, name, value)
-
-    def __getattr__(self, name: str) -> Any:
-        """Only asked for fields that are not yet known."""
-        if name not in Plan.__dataclass_fields__:
-            raise AttributeError(f"a Plan has no attribute {name!r}")
-        whole = self._examine()
-        for each in Plan.__dataclass_fields__:
-            object.__setattr__(self, each, getattr(whole, each))
-        return getattr(whole, name)
-
-    def __repr__(self) -> str:
-        return repr(Plan(*self._values()))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Plan, self._values()
-
-    def _values(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, name) for name in Plan.__dataclass_fields__)

@@ -45,8 +45,8 @@ def seen_from(
 
 def placed(plan: Plan, start: Array) -> Plan:
     """The plan with its target and its end where they are in space."""
-    details = {**plan.details, "start": start}
-    return replace(plan, target=start @ plan.target, X_final=start @ plan.X_final, details=details)
+    facts = replace(plan.facts, X_final=start @ plan.X_final, details={**plan.details, "start": start})
+    return replace(plan, target=start @ plan.target, outcome=facts)
 
 
 def _pairs(via: Sequence[Any]) -> list[tuple[float, Any]]:

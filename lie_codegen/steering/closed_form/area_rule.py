@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -18,11 +19,12 @@ from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.fourier import Family
 from lie_codegen.steering.constraints import limits
 from lie_codegen.steering.finish import finish
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.plan import Controls, Plan, Status, Stretched
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.extremals import SOLVED
 from lie_codegen.steering.shooting.shooter import shooter
 from lie_codegen.steering.task import Task
+from lie_codegen.values import Value
 
 _SAMPLES = 65
 _SHARP = 1e-13
@@ -228,10 +230,17 @@ def _restored(family: Family, task: Task, c: Array) -> tuple[Array, float]:
     return c, float(np.max(np.abs(gap)))
 
 
-def _controls(task: Task, family: Family, c: Array) -> Controls:
-    def evaluate(t: Array) -> Array:
-        u = np.zeros((len(t), task.group.dim))
-        u[:, list(task.controls)] = family.evaluate(c, t / task.duration) / task.duration
-        return u
+@dataclass(frozen=True, eq=False, repr=False)
+class FourierSeries(Value):
+    """Fourier controls over unit time by their coefficients."""
 
-    return Controls(evaluate, ())
+    family: Family
+    c: Array
+
+    def __call__(self, s: Array) -> Array:
+        """(k,) -> (k, m)."""
+        return self.family.evaluate(self.c, s)
+
+
+def _controls(task: Task, family: Family, c: Array) -> Controls:
+    return Controls(Stretched(task.group.dim, tuple(task.controls), FourierSeries(family, c), task.duration), ())

@@ -14,9 +14,34 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.closed_form.endpoint import flow_end, retune
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop, Segment, Straight
 from lie_codegen.steering.plan import Controls
+from lie_codegen.values import Value
 
 _NEGLIGIBLE = 1e-9
 _STEPS = 32
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ChainVelocity(Value):
+    """u(t) of segments driven in turn, over and over, between the edges."""
+
+    n: int
+    controls: tuple[int, ...]
+    parts: tuple[tuple[Segment, Array], ...]
+    edges: Array
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        u = np.zeros((len(t), self.n))
+        count = len(self.edges) - 1
+        place = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, max(count - 1, 0))
+        for number in range(count):
+            now = np.flatnonzero(place == number)
+            if len(now):
+                segment, x = self.parts[number % len(self.parts)]
+                span = self.edges[number + 1] - self.edges[number]
+                values = segment.velocity(x, (t[now] - self.edges[number]) / span) / span
+                u[now[:, None], np.array(self.controls)] = values
+        return u
 
 
 @dataclass(frozen=True)
@@ -77,19 +102,8 @@ class Chain:
         lengths = np.array([length for _, _, length in driven] * self.repeats)
         edges = duration * np.concatenate([[0.0], np.cumsum(lengths)]) / max(float(np.sum(lengths)), 1e-300)
 
-        def evaluate(t: Array) -> Array:
-            u = np.zeros((len(t), self.group.dim))
-            place = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, max(len(lengths) - 1, 0))
-            for number in range(len(lengths)):
-                now = np.flatnonzero(place == number)
-                if len(now):
-                    segment, x, _ = driven[number % len(driven)]
-                    span = edges[number + 1] - edges[number]
-                    values = segment.velocity(x, (t[now] - edges[number]) / span) / span
-                    u[now[:, None], np.array(self.controls)] = values
-            return u
-
-        return Controls(evaluate, edges[1:-1])
+        parts = tuple((segment, x) for segment, x, _ in driven)
+        return Controls(ChainVelocity(self.group.dim, self.controls, parts, edges), edges[1:-1])
 
     def retuned(self, target: Array) -> tuple[Chain, float]:
         """The chain, its sizes changed, that ends at the target exactly; and max |target^-1 X(1) - I| that is left."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import operator
 import time
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -24,9 +25,10 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.steering.closed_form.endpoint import approach, flow_end, sharpen
 from lie_codegen.steering.finish import finish
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.plan import Controls, Plan, Status, Stretched
 from lie_codegen.steering.seeds import coordinates
 from lie_codegen.steering.task import Task
+from lie_codegen.values import Value
 
 _NEGLIGIBLE = 1e-12
 _ROUNDING = 1e-28
@@ -189,10 +191,16 @@ def _end(task: Task, x: Array, refine: int) -> tuple[Array, Array]:
     return X, np.einsum("kin,kip->np", carried, slopes)
 
 
-def _controls(task: Task, x: Array) -> Controls:
-    def evaluate(t: Array) -> Array:
-        u = np.zeros((len(t), task.group.dim))
-        u[:, list(task.controls)] = _arc(x, t / task.duration) / task.duration
-        return u
+@dataclass(frozen=True, eq=False, repr=False)
+class Arc(Value):
+    """Two controls that turn at a constant rate over unit time."""
 
-    return Controls(evaluate, ())
+    x: Array
+
+    def __call__(self, s: Array) -> Array:
+        """(k,) -> (k, 2)."""
+        return _arc(self.x, s)
+
+
+def _controls(task: Task, x: Array) -> Controls:
+    return Controls(Stretched(task.group.dim, tuple(task.controls), Arc(x), task.duration), ())

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 import operator
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from lie_codegen.steering.closed_form.free_amplitude import LineAndCircles, free
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
+from lie_codegen.values import Value
 
 _NEGLIGIBLE = 1e-12
 #: Periods that the paper's loops may take unasked; where gd_i gd_j is small they take any number, at any speed.
@@ -204,6 +206,29 @@ def _periods(task: Task, q: int | None, wanted: float, loop: float) -> int:
     return count
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class FourPhases(Value):
+    """(62)-(63): a quarter of a sine, loops, a quarter of a cosine, and half a period back."""
+
+    n: int
+    positions: tuple[int, int]
+    sizes: tuple[float, float]
+    psi: float
+    w: float
+    ends: tuple[float, float, float]
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        w, (t1, t2, t3) = self.w, self.ends
+        phase = [t <= t1, t <= t2, t <= t3]
+        values = np.zeros((len(t), self.n))
+        for position, size, shift in zip(self.positions, self.sizes, (0.0, self.psi), strict=True):
+            loop = np.cos(w * (t - t1) - shift) / math.cos(shift)
+            pieces = [np.sin(w * t), loop, np.cos(w * (t - t2))]
+            values[:, position] = size * w * np.select(phase, pieces, -0.5 * np.sin(w * (t - t3)))
+        return values
+
+
 def _controls(
     task: Task, positions: tuple[int, int], gd: tuple[float, float], psi: float, q: int, period: float
 ) -> Controls:
@@ -213,13 +238,4 @@ def _controls(
     t2 = t1 + q * period
     t3 = t2 + period / 4
 
-    def evaluate(t: Array) -> Array:
-        phase = [t <= t1, t <= t2, t <= t3]
-        values = np.zeros((len(t), task.group.dim))
-        for position, size, shift in zip(positions, gd, (0.0, psi), strict=True):
-            loop = np.cos(w * (t - t1) - shift) / math.cos(shift)
-            pieces = [np.sin(w * t), loop, np.cos(w * (t - t2))]
-            values[:, position] = size * w * np.select(phase, pieces, -0.5 * np.sin(w * (t - t3)))
-        return values
-
-    return Controls(evaluate, [t1, t2, t3])
+    return Controls(FourPhases(task.group.dim, positions, gd, psi, w, (t1, t2, t3)), [t1, t2, t3])

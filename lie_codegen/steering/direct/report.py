@@ -12,7 +12,7 @@ from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.goals import GoalSet
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 
 
 def plan_of(
@@ -38,6 +38,17 @@ def plan_of(
     )
     aim = task.end.elements[variant] if task.end.elements is not None else found.X
     steady = inputs.knots[1:-1]
+    told = {
+        "goal": target if isinstance(target, GoalSet) else aim,
+        "inputs": inputs,
+        "system": system,
+        "violation": {"end": error, "bound": over},
+        "objective_value": cost_of(task, inputs, objective),
+        "weights": task.weights,
+        "control_peaks": inputs.peaks(),
+        "fidelity": fidelity(task, found.X, variant),
+        **details,
+    }
     return Plan(
         group=group,
         target=aim,
@@ -48,21 +59,13 @@ def plan_of(
         cost=cost_of(task, inputs, objective)
         if objective == "fuel"
         else inputs.integral_of_squares(np.ones(task.controls)),
-        X_final=found.X,
-        error=error,
-        status=status or (Status.LOCAL if error <= tolerance else Status.NOT_CONVERGED),
-        seconds=seconds,
-        details={
-            "goal": target if isinstance(target, GoalSet) else aim,
-            "inputs": inputs,
-            "system": system,
-            "violation": {"end": error, "bound": over},
-            "objective_value": cost_of(task, inputs, objective),
-            "weights": task.weights,
-            "control_peaks": inputs.peaks(),
-            "fidelity": fidelity(task, found.X, variant),
-            **details,
-        },
+        outcome=Facts(
+            found.X,
+            error,
+            status or (Status.LOCAL if error <= tolerance else Status.NOT_CONVERGED),
+            told,
+            seconds,
+        ),
     )
 
 

@@ -17,7 +17,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.goals import Pointing, Position
 from lie_codegen.steering.ocp.problem_data import Affine
 from lie_codegen.steering.ocp.stage_controls import StageControls
-from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 
 if TYPE_CHECKING:
     from lie_codegen.steering.ocp.problem import OptimalControlProblem
@@ -108,11 +108,13 @@ def open_plan(
         method="ocp",
         u=Controls(velocities, found.t),
         cost=found.cost,
-        X_final=found.X_final,
-        error=found.error,
-        status=Status.LOCAL if found.error <= tolerance else Status.NOT_CONVERGED,
-        seconds={"solve": time.perf_counter() - began},
-        details={"plan": found, "problem": problem, "inputs": StageControls(found.u, found.duration)},
+        outcome=Facts(
+            found.X_final,
+            found.error,
+            Status.LOCAL if found.error <= tolerance else Status.NOT_CONVERGED,
+            {"plan": found, "problem": problem, "inputs": StageControls(found.u, found.duration)},
+            {"solve": time.perf_counter() - began},
+        ),
     )
 
 

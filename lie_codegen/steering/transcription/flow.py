@@ -12,6 +12,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.steering.plan import Controls
 from lie_codegen.steering.transcription.numbers import Numbers
+from lie_codegen.values import Value
 
 #: States a knot interval at which obstacles are checked.
 FINE = 8
@@ -79,14 +80,25 @@ def _between(values: Array, parts: int) -> Array:
     return np.concatenate([inner, values[-1:]])
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Lines(Value):
+    """m controls that are linear between knots, set among n components."""
+
+    n: int
+    controls: tuple[int, ...]
+    knots: Array
+    values: Array
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) times -> (k, n)."""
+        u = np.zeros((len(t), self.n))
+        for position, column in zip(self.controls, self.values.T, strict=True):
+            u[:, position] = np.interp(t, self.knots, column)
+        return u
+
+
 def piecewise_linear(group: MatrixGroup, controls: tuple[int, ...], values: Array, duration: float) -> Controls:
     """u(t), (k,) times -> (k, n), linear between `values` (N + 1, m) at equidistant knots."""
     knots = np.linspace(0, duration, len(values))
 
-    def evaluate(t: Array) -> Array:
-        u = np.zeros((len(t), group.dim))
-        for position, column in zip(controls, values.T, strict=True):
-            u[:, position] = np.interp(t, knots, column)
-        return u
-
-    return Controls(evaluate, knots[1:-1])
+    return Controls(Lines(group.dim, tuple(controls), knots, values), knots[1:-1])

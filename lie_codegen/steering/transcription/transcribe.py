@@ -20,7 +20,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.steering.constraints import Obstacle
-from lie_codegen.steering.plan import Plan, Status
+from lie_codegen.steering.plan import Facts, Plan, Status
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.complaint import complaint, ends_in_obstacles
 from lie_codegen.steering.transcription.flow import piecewise_linear
@@ -257,9 +257,7 @@ def _plan(
         method=method,
         u=piecewise_linear(group, task.controls, values, duration),
         cost=float(np.sum(a * a + a * b + b * b)) * duration / (3 * structure.intervals),
-        X_final=flight.X[-1],
-        error=error,
-        status=status or (Status.LOCAL if solved else Status.NOT_CONVERGED),
-        seconds=seconds,
-        details=details,
+        outcome=Facts(
+            flight.X[-1], error, status or (Status.LOCAL if solved else Status.NOT_CONVERGED), details, seconds
+        ),
     )

@@ -1,0 +1,199 @@
+"""Values in files: one npz a value, arrays as arrays and the rest as JSON; nothing in it is ever run.
+
+A file holds "header", JSON in UTF-8 with the format's version and the value as nested records, and one entry an array. A
+record names its class, which must be a value of this package; a group stands there as its definition.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import fields
+from enum import Enum
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.arrays import Array
+from lie_codegen.errors import InputError
+from lie_codegen.kernel.definition import Definition, made_from
+from lie_codegen.values import Value
+
+FORMAT, VERSION = "lie_codegen value", 1
+
+
+class Saved(Value):
+    """A value that can be kept in a file."""
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as an npz file that `lc.load` reads; returns the path.
+
+        Raises:
+            InputError: it holds something that is no data, as a function written by the user; names it.
+            OSError: the file cannot be written.
+        """
+        arrays: dict[str, Array] = {}
+        record = _encoded(self, arrays, type(self).__name__)
+        header = json.dumps({"format": FORMAT, "version": VERSION, "value": record}, sort_keys=True)
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, header=np.frombuffer(header.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
+        target = Path(path)
+        target.write_bytes(buffer.getvalue())
+        return target
+
+
+def load(path: str | Path) -> Any:
+    """The value of a file that `save` wrote.
+
+    Raises:
+        InputError: no such file, not one of ours, of a later version, or it names something that is no value of this package.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as data:
+            entries = {name: data[name] for name in data.files}
+        header = json.loads(bytes(entries.pop("header")).decode())
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path} is no file that save() wrote: {error}") from None
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise InputError(f"{path} is no file that save() wrote")
+    if header.get("version") != VERSION:
+        raise InputError(
+            f"{path} is of version {header.get('version')!r}; this package reads version {VERSION}: update it"
+        )
+    return _decoded(header["value"], entries, str(path))
+
+
+def table_text(columns: Mapping[str, Array]) -> str:
+    """CSV with a header line; numbers to the last bit."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([repr(float(entry)) for entry in row] for row in zip(*columns.values(), strict=True))
+    return out.getvalue()
+
+
+def json_value(value: Any) -> Any:
+    """A value as plain JSON data for other programs: arrays as lists, complex numbers as [re, im]."""
+    if isinstance(value, np.ndarray):
+        return json_value(value.tolist())
+    if isinstance(value, complex | np.complexfloating):
+        return [float(value.real), float(value.imag)]
+    if isinstance(value, np.generic):
+        return json_value(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return repr(value)
+    if value is None or isinstance(value, str | int | float):
+        return value
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, Mapping):
+        return {str(key): json_value(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_value(each) for each in value]
+    name = getattr(value, "name", None)
+    return name if isinstance(name, str) else type(value).__name__
+
+
+def _encoded(value: Any, arrays: dict[str, Array], where: str) -> Any:
+    if type(value) is np.ndarray and value.dtype.kind in "biufc":
+        name = f"a{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if isinstance(value, np.generic):
+        return _encoded(value.item(), arrays, where)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return {"float": value.hex() if np.isfinite(value) else repr(value)}
+    if isinstance(value, complex):
+        return {"complex": [_encoded(value.real, arrays, where), _encoded(value.imag, arrays, where)]}
+    if isinstance(value, Enum):
+        return {"enum": _name_of(type(value)), "member": value.name}
+    if isinstance(value, list | tuple):
+        inside = [_encoded(each, arrays, f"{where}[{i}]") for i, each in enumerate(value)]
+        return {"list" if isinstance(value, list) else "tuple": inside}
+    own = getattr(value, "definition", None)
+    if isinstance(own, Definition):
+        return {"definition": json.loads(own.text)}
+    if isinstance(value, Mapping):
+        return {"mapping": [[str(k), _encoded(v, arrays, f"{where}[{k!r}]")] for k, v in value.items()]}
+    if hasattr(type(value), "__dataclass_fields__") and type(value).__module__.split(".")[0] == "lie_codegen":
+        held = {f.name: _encoded(getattr(value, f.name), arrays, f"{where}.{f.name}") for f in fields(value) if f.init}
+        return {"record": _name_of(type(value)), "fields": held}
+    raise InputError(f"{where} cannot be saved: {type(value).__name__} is no data")
+
+
+def _name_of(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def _decoded(record: Any, arrays: Mapping[str, Array], path: str) -> Any:
+    if record is None or isinstance(record, bool | int | str):
+        return record
+    if not isinstance(record, dict):
+        raise InputError(f"{path}: {record!r:.60} is no record")
+    try:
+        return _record(record, arrays, path)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path} is damaged: {error}") from None
+
+
+def _record(record: dict[str, Any], arrays: Mapping[str, Array], path: str) -> Any:
+    if "array" in record:
+        return arrays[record["array"]]
+    if "float" in record:
+        text = record["float"]
+        return float.fromhex(text) if "0x" in text else float(text)
+    if "complex" in record:
+        return complex(*(_decoded(part, arrays, path) for part in record["complex"]))
+    if "enum" in record:
+        return _class_of(record["enum"], path, enum=True)[record["member"]]
+    for kind, make in (("list", list), ("tuple", tuple)):
+        if kind in record:
+            return make(_decoded(each, arrays, path) for each in record[kind])
+    if "mapping" in record:
+        return {key: _decoded(each, arrays, path) for key, each in record["mapping"]}
+    if "definition" in record:
+        _check_kinds(record["definition"], path)
+        return made_from(record["definition"])
+    made = _class_of(record["record"], path, enum=False)
+    known = {field.name for field in fields(made) if field.init}
+    unknown = sorted(set(record["fields"]) - known)
+    if unknown:
+        raise InputError(f"{path}: a {made.__name__} has no {', '.join(unknown)}; was it written by a later version?")
+    return made(**{name: _decoded(each, arrays, path) for name, each in record["fields"].items()})
+
+
+def _class_of(name: str, path: str, *, enum: bool) -> Any:
+    """A class of this package that holds data; nothing else is imported, let alone called."""
+    module, _, attribute = str(name).partition(":")
+    if module.split(".")[0] != "lie_codegen":
+        raise InputError(f"{path} names {name!r}, which is no value of this package")
+    try:
+        found = getattr(import_module(module), attribute)
+    except (ImportError, AttributeError):
+        raise InputError(f"{path} names {name!r}, which this version does not have") from None
+    fits = isinstance(found, type) and (issubclass(found, Enum) if enum else hasattr(found, "__dataclass_fields__"))
+    if not fits:
+        raise InputError(f"{path} names {name!r}, which is no value of this package")
+    return found
+
+
+def _check_kinds(definition: Any, path: str) -> None:
+    """Every factory that a definition names is one of this package."""
+    if isinstance(definition, Mapping):
+        kind = definition.get("kind")
+        if "parameters" in definition and not str(kind).startswith("lie_codegen."):
+            raise InputError(f"{path} names {kind!r}, which is no value of this package")
+        for each in definition.values():
+            _check_kinds(each, path)
+    elif isinstance(definition, list | tuple):
+        for each in definition:
+            _check_kinds(each, path)
