@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.errors import SteeringInputError
-from lie_codegen.flow.metric import admitted_element
+from lie_codegen.flow.elements import admitted_element
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords

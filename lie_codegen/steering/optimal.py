@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.flow.metric import distance
+from lie_codegen.flow.logarithm import distance
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.finish import energy, flown_end
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
