@@ -69,10 +69,11 @@ void se2_exp(const double x[3], double X[9]);
 
 /*
  * se2_log
- *   exp(x_1 A_1 + ... + x_n A_n) = X, principal
+ *   exp(x_1 A_1 + ... + x_n A_n) = X with the least sum of squares of turning angles; NaN where there is none
  *   in  X: (3, 3) matrix, row-major; element of the group
  *   out x: (3) vector, [rad, m, m]; components omega, vx, vy
- *   Source: the inverse of exp; principal: eigenvalues of hat(x) have imaginary parts in (-pi, pi]
+ *   Source: checked: closed forms by membership, iterations by exp(-hat x) X; within 1e-5 of the group that of
+ *   the nearest element
  */
 void se2_log(const double X[9], double x[3]);
 

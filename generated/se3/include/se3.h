@@ -75,10 +75,11 @@ void se3_exp(const double x[6], double X[16]);
 
 /*
  * se3_log
- *   exp(x_1 A_1 + ... + x_n A_n) = X, principal
+ *   exp(x_1 A_1 + ... + x_n A_n) = X with the least sum of squares of turning angles; NaN where there is none
  *   in  X: (4, 4) matrix, row-major; element of the group
  *   out x: (6) vector, [rad, rad, rad, m, m, m]; components w1, w2, w3, v1, v2, v3
- *   Source: the inverse of exp; principal: eigenvalues of hat(x) have imaginary parts in (-pi, pi]
+ *   Source: checked: closed forms by membership, iterations by exp(-hat x) X; within 1e-5 of the group that of
+ *   the nearest element
  */
 void se3_log(const double X[16], double x[6]);
 
