@@ -12,6 +12,7 @@ from .kernels import euler_poincare_kernel as euler_poincare_kernel
 from .kernels import spatial_momentum_kernel as spatial_momentum_kernel
 from .lagrangian import lagrangian_system as lagrangian_system
 from .relative_equilibria import linear_controllability as linear_controllability
+from .relative_equilibria import relative_equilibria as relative_equilibria
 from .relative_equilibria import relative_equilibrium as relative_equilibrium
 from .routh import routh_reduce as routh_reduce
 from .variational_step import variational_step as variational_step

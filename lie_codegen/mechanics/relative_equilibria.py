@@ -7,7 +7,7 @@ det(s^2 M + s C + K) (Laub and Arnold 1984; Sanyal, Bloch and McClamroch, (33), 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,6 +23,8 @@ from lie_codegen.mechanics.routh import RouthReduction
 
 #: A singular value below this, relative to the largest, counts as zero.
 RANK_TOLERANCE = 1e-9
+#: Two equilibria nearer to one another than this are one.
+_DISTINCT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -89,18 +91,57 @@ def relative_equilibrium(
     guess: ArrayLike,
     parameters: Mapping[str, float] | None = None,
 ) -> RelativeEquilibrium:
-    """The equilibrium nearest to a guess (n,), by Newton's method on the generalized force at rest.
+    """The equilibrium nearest to a guess (n,), of all that `relative_equilibria` finds around it.
 
     Raises:
         InputError: a parameter without a value.
-        ComputationError: no equilibrium is found from the guess.
+        ComputationError: no equilibrium is found.
+    """
+    return relative_equilibria(system, guess, parameters)[0]
+
+
+def relative_equilibria(
+    system: LagrangianSystem | RouthReduction,
+    guess: ArrayLike,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    reach: float = np.pi,
+    starts: int = 64,
+) -> tuple[RelativeEquilibrium, ...]:
+    """The equilibria around a guess (n,), nearest first, each with its stability (`.verdict`).
+
+    Newton's method on the generalized force at rest, from the guess and from `starts` random points (seeded) of the box guess +-
+    `reach`. Newton's method alone may run past the nearest root to another; that none is missed is likely, not proved.
+
+    Raises:
+        InputError: a parameter without a value, a guess of the wrong length, starts below 0.
+        ComputationError: no equilibrium is found.
     """
     mechanical = system.system if isinstance(system, RouthReduction) else system
     values = parameter_numbers(mechanical.parameter_symbols, parameters)
     rest = dict.fromkeys(mechanical.v, sp.S.Zero)
     force = mechanical.generalized_force.xreplace(values)
     at_rest = force.xreplace(rest)
-    q = newton(at_rest, mechanical.q, guess)
+    centre = np.atleast_1d(np.array(guess, dtype=np.float64))
+    if starts < 0:
+        raise InputError(f"starts is a number of points, given {starts}")
+    first = _first_guess(centre, mechanical.q)
+    spread = np.random.default_rng(0).uniform(-1, 1, (starts, len(first)))
+    run = NewtonMethod.of(at_rest, mechanical.q)
+    ends = [run.from_guess(start) for start in (first, *(first + reach * spread))]
+    found: list[Array] = []
+    for q in ends:
+        if q is not None and all(np.max(np.abs(q - other)) > _DISTINCT for other in found):
+            found.append(q)
+    if not found:
+        raise ComputationError(f"no equilibrium found from the guess {guess!r}, nor from {starts} points around it")
+    found.sort(key=lambda q: float(np.linalg.norm(q - first)))
+    return tuple(_linearised(mechanical, force, at_rest, values, rest, q) for q in found)
+
+
+def _linearised(
+    mechanical: LagrangianSystem, force: Any, at_rest: Any, values: Mapping[Any, Any], rest: Mapping[Any, Any], q: Array
+) -> RelativeEquilibrium:
     here = {**dict(zip(mechanical.q, map(sp.Float, q), strict=True)), **rest}
     x, v = sp.Matrix(mechanical.q), sp.Matrix(mechanical.v)
 
@@ -137,31 +178,61 @@ def linear_controllability(equilibrium: RelativeEquilibrium) -> LinearControllab
     return LinearControllability(controllable, tuple(complex(r) for r in e.eigenvalues), tuple(smallest), reason)
 
 
+@dataclass(frozen=True)
+class NewtonMethod:
+    """Newton's method on an exact field, compiled to numpy once.
+
+    Attributes:
+        value, slope: of the field and of its derivative, from a point.
+    """
+
+    value: Callable[[Array], Any]
+    slope: Callable[[Array], Any]
+
+    @staticmethod
+    def of(field: Any, variables: Sequence[sp.Symbol]) -> NewtonMethod:
+        """For a field of some variables."""
+        column = sp.Matrix(list(variables))
+        return NewtonMethod(
+            sp.lambdify([list(variables)], list(field), "numpy", cse=True),
+            sp.lambdify([list(variables)], field.jacobian(column).tolist(), "numpy", cse=True),
+        )
+
+    def from_guess(self, guess: Array) -> Array | None:
+        """The zero that it ends at, to rounding; None where it ends at none."""
+        x = np.array(guess, dtype=np.float64)
+        with np.errstate(all="ignore"):
+            for _ in range(60):
+                residual = np.array(self.value(x), dtype=np.float64)
+                jacobian = np.array(self.slope(x), dtype=np.float64)
+                if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+                    return None
+                step = np.linalg.lstsq(jacobian, residual, rcond=1e-13)[0]
+                x = x - step * min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-300))
+                if np.abs(step).max() < 1e-13 * max(1.0, float(np.abs(x).max())):
+                    # A stationary point of |f| that is no zero also stops the steps.
+                    return x if np.abs(residual).max() <= 1e-8 * max(1.0, float(np.abs(jacobian).max())) else None
+        return None
+
+
 def newton(field: Any, variables: Sequence[sp.Symbol], guess: ArrayLike) -> Array:
-    """A zero of an exact field near a guess, to rounding.
+    """A zero of an exact field, found by Newton's method from a guess, to rounding.
 
     Raises:
         InputError: a guess of the wrong length.
         ComputationError: no convergence.
     """
+    found = NewtonMethod.of(field, variables).from_guess(_first_guess(guess, variables))
+    if found is None:
+        raise ComputationError(f"no equilibrium found from the guess {guess!r}: Newton's method ends at none")
+    return found
+
+
+def _first_guess(guess: ArrayLike, variables: Sequence[sp.Symbol]) -> Array:
     x = np.atleast_1d(np.array(guess, dtype=np.float64))
     if x.shape != (len(variables),):
         raise InputError(f"the guess has shape {x.shape}; it needs {len(variables)} values, for {variables}")
-    column = sp.Matrix(list(variables))
-    value = sp.lambdify([list(variables)], list(field), "numpy", cse=True)
-    slope = sp.lambdify([list(variables)], field.jacobian(column).tolist(), "numpy", cse=True)
-    for _ in range(60):
-        residual = np.array(value(x), dtype=np.float64)
-        jacobian = np.array(slope(x), dtype=np.float64)
-        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-            break
-        step = np.linalg.lstsq(jacobian, residual, rcond=1e-13)[0]
-        x = x - step * min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-300))
-        if np.abs(step).max() < 1e-13 * max(1.0, float(np.abs(x).max())):
-            if np.abs(residual).max() > 1e-8 * max(1.0, float(np.abs(jacobian).max())):
-                break
-            return x
-    raise ComputationError(f"no equilibrium found from the guess {guess!r}: Newton's method ended at {x.tolist()}")
+    return x
 
 
 def parameter_numbers(symbols: Sequence[sp.Symbol], parameters: Mapping[str, Any] | None) -> dict[sp.Symbol, sp.Expr]:

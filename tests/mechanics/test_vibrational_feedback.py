@@ -11,7 +11,7 @@ from scipy.special import mathieu_a
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.mechanics.lagrangian import lagrangian_system
-from lie_codegen.mechanics.relative_equilibria import linear_controllability, relative_equilibrium
+from lie_codegen.mechanics.relative_equilibria import linear_controllability, relative_equilibria, relative_equilibrium
 from lie_codegen.mechanics.routh import routh_reduce
 from lie_codegen.mechanics.vibrational_average import vibrational_average
 from lie_codegen.mechanics.vibrational_feedback import design_feedback, switch_phase
@@ -179,3 +179,26 @@ def test_refusals_say_why():
     ramp = lagrangian_system(coordinates=("x",), lagrangian="dx^2/2 - x")
     with pytest.raises(ComputationError, match="no equilibrium found"):
         relative_equilibrium(ramp, [0.0])
+
+
+def test_every_root_around_a_guess_is_given_nearest_first_with_its_stability() -> None:
+    """V = cos q + q^2/10: zeros of sin q - q/5, found by a fine scan; a guess near the top of the hill gets the hill's own root."""
+    system = lagrangian_system(coordinates=("q",), lagrangian="dq^2/2 - cos(q) - q^2/10")
+    q = np.linspace(-3.6, 4.6, 400001)
+    force = np.sin(q) - q / 5
+    roots = q[:-1][np.sign(force[:-1]) * np.sign(force[1:]) <= 0]
+    for guess in (
+        0.5,
+        1.45,
+    ):  # from 1.45 Newton's method alone runs far away: the slope of the force is almost zero there
+        found = relative_equilibria(system, [guess], reach=3.1)
+        known = sorted(roots, key=lambda root: abs(root - guess))
+        inside = [root for root in known if abs(root - guess) < 3.0]
+        ours = [float(each.q[0]) for each in found]
+        for root in inside:
+            assert min(abs(root - each) for each in ours) < 1e-4
+        assert ours == sorted(ours, key=lambda each: abs(each - guess))
+        assert abs(relative_equilibrium(system, [guess]).q[0] - known[0]) < 1e-4
+        for each in found:
+            stable = -np.cos(each.q[0]) + 1 / 5 > 0
+            assert each.verdict == ("stable" if stable else "unstable")
