@@ -19,6 +19,7 @@ import os, signal, threading
 import numpy as np
 import lie_codegen as lc
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background is born deaf to it
 u = lc.PeriodicInput(["cos(t)", "sin(t)", "0"], period="2*pi")
 lc.simulate("so3", u, t=[0, 1])
 threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()

@@ -159,7 +159,7 @@ def test_a_failure_is_told_when_the_kernel_is_asked_for_and_is_not_kept(
     library = lc.build("so3")
     with monkeypatch.context() as patch:
         patch.setattr(ladder, "compile_library", _full_disk)
-        patch.setattr("lie_codegen.runtime.build.temporary_folder", lambda reason: home)
+        patch.setattr("lie_codegen.runtime.cache_door.temporary_folder", lambda reason: home)
         with pytest.raises(OSError, match="No space left"):
             library.exp  # noqa: B018
     assert library.exp([0.0, 0.0, 0.0])[0, 0] == 1.0
@@ -308,7 +308,8 @@ def test_an_edit_makes_those_groups_stale_that_are_made_from_it(
     assert stale_after("groups/kernels.py", lambda text: text + "# a remark\n") == set()
     assert stale_after("groups/kernels.py", lambda text: text.replace('"""', '"""About ', 1)) == set()
     assert (
-        stale_after("groups/kernels.py", lambda text: text + "\ndef fresh():\n    return _mine\n_mine = 3\n") == set()
+        stale_after("groups/kernels.py", lambda text: text + "\ndef _unheard():\n    return _unseen\n_unseen = 3\n")
+        == set()
     )
     assert (
         stale_after(

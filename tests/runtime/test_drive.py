@@ -201,7 +201,7 @@ def _turning(t: float) -> np.ndarray:
 def test_long_horizons_reach_the_tolerance_and_keep_no_state_a_step(horizon: float) -> None:
     """From 5e4 steps (t = 300) to 6.5e6 (t = 10^4, two seconds): the truth is known in closed form."""
     u = lc.PeriodicInput(["cos(7*t/10)", "sin(7*t/10)", "-2/5"], period="20*pi/7")
-    run = lc.simulate(lc.group("so3"), u, t=np.linspace(0, horizon, 11))
+    run = lc.simulate(lc.group("so3"), u, t=np.linspace(0, horizon, 11), method="rkmk4")
     assert run.steps > 150 * horizon
     for t, X in zip(run.t, run.X, strict=True):
         np.testing.assert_allclose(X, _turning(t), rtol=0, atol=2e-11)
@@ -239,7 +239,7 @@ def test_formulas_of_the_command_line_become_series_where_they_are(
 
 def test_what_is_out_of_reach_is_said_at_once() -> None:
     u = lc.PeriodicInput(["cos(1000*t)", "0", "0"])
-    with pytest.raises(ComputationError, match=r"steps do not reach.*more than the 67108864"):
+    with pytest.raises(ComputationError, match="more than the 67108864 steps"):
         lc.simulate(lc.group("so3"), u, t=[0, 1e9])
 
 
@@ -322,7 +322,7 @@ def test_refusals(probe: Library) -> None:
         (
             lambda: lc.simulate(lc.group("so3"), u, t=[0, 1], X0=[np.eye(3), 2 * np.eye(3)]),
             NotOnGroupError,
-            r"X0\[1\] is not on so3: its determinant is 8",
+            r"X0\[1\] is not on the group so3: X\^T X - 1 = 3",
         ),
     ]
     for call, error, words in cases:
