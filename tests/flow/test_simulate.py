@@ -211,5 +211,5 @@ def test_texts_where_numbers_belong_are_named() -> None:
         lambda: lc.structure(3),
         lambda: lc.tracking_law(3, inertia=1, error="so3_right"),
     ):
-        with pytest.raises(InputError, match="expected (a|the name of a) group"):
+        with pytest.raises(InputError, match=r"expected (a|the name of a) group"):
             call()
