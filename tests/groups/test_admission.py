@@ -34,8 +34,8 @@ def test_messages_give_differences_and_the_phase_that_mends_a_gate() -> None:
     so3, su2, su4 = lc.group("so3"), lc.group("su2"), lc.group("su4")
     with pytest.raises(NotOnGroupError, match=r"det X.*= -1"):
         admitted(so3, np.diag([1.0, 1, -1]), "X0")
-    with pytest.raises(NotOnGroupError, match="det X - 1 = 3e-05"):
-        admitted(lc.group("sl3"), np.diag([1, 1, 1 + 3e-5]), "X")
+    with pytest.raises(NotOnGroupError, match="det X - 1 = 0.0003"):
+        admitted(lc.group("sl3"), np.diag([1, 1, 1 + 3e-4]), "X")
     hadamard = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
     with pytest.raises(NotOnGroupError, match=r"exp\(-1.570796327j\)"):
         admitted(su2, hadamard, "target")
@@ -81,6 +81,21 @@ def test_a_target_printed_with_few_digits_costs_what_the_exact_one_costs(
             # the energy of the projected target, to 1e-9
             projected = lc.steer(group, lc.nearest(group, printed).X, controls=used, duration=2.0).cost
             assert cost == pytest.approx(projected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["so3", "se3", "su2", "su3"])
+def test_elements_printed_with_five_decimals_are_taken_and_with_two_are_not(name: str) -> None:
+    group, rng = lc.group(name), np.random.default_rng(8)
+    refused = 0
+    for _ in range(60):
+        X = scipy.linalg.expm(group.hat(rng.normal(size=group.dim)))
+        found = admitted(group, np.round(X, 5), "X")
+        assert 0 < found.projected < 2e-5
+        try:
+            admitted(group, np.round(X, 2), "X")
+        except NotOnGroupError:
+            refused += 1
+    assert refused >= 58
 
 
 def test_batches_are_judged_one_by_one() -> None:

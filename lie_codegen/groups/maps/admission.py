@@ -3,7 +3,8 @@
 With kappa = max(1, |X| |X^-1|), the sizes of the largest entries, and `defect` as in `groups.maps.defect`:
     defect <= 1e-12 kappa    taken as it is;
     defect <= 1e-5           the nearest element is taken and its distance reported: rotations in single precision and printed
-                             with seven digits lie here;
+                             with seven digits lie here; so are matrices whose entries are all within 1e-5 of the nearest
+                             element's, as printed with five digits (their defect, of second degree in X, is up to twice that);
     above                    refused. A wrong component (a determinant of -1) is above at any tolerance.
 """
 
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 ON_GROUP = 1e-12
 #: Projected up to here.
 NEAR_GROUP = 1e-5
+#: Up to here the entries decide.
+_DOUBTFUL = 5 * NEAR_GROUP
 
 
 @dataclass(frozen=True)
@@ -66,9 +69,10 @@ def admitted(group: MatrixGroup, X: ArrayLike, where: str) -> Admitted:
             kappa = 1.0
     if off <= ON_GROUP * kappa:
         return Admitted(matrix, 0.0)
-    if off <= NEAR_GROUP:
+    if off <= _DOUBTFUL:
         found = nearest(group, matrix)
-        return Admitted(found.X, float(found.distance))
+        if off <= NEAR_GROUP or np.max(np.abs(found.X - matrix)) <= NEAR_GROUP:
+            return Admitted(found.X, float(found.distance))
     raise NotOnGroupError(f"{where} is not on the group {group.name}: {_why(group, matrix)}")
 
 
