@@ -83,6 +83,7 @@ from .groups import group as group
 from .groups import group_kernels as group_kernels
 from .groups import group_names as group_names
 from .groups import interpolate as interpolate
+from .groups import jacobian as jacobian
 from .groups import mean as mean
 from .groups import nearest as nearest
 from .groups import pauli as pauli
@@ -102,6 +103,7 @@ from .groups import with_quaternion as with_quaternion
 # kernel
 from .kernel import Kernel as Kernel
 from .kernel import Port as Port
+from .kernel import casadi_function as casadi_function
 from .kernel import kernel_factory as kernel_factory
 from .kernel import load as load
 
