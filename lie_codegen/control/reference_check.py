@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.control.reference_kernels import ReferenceBody
-from lie_codegen.control.reference_motion import Reference
+from lie_codegen.control.reference_motion import PlanReference, Reference
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
@@ -37,6 +37,13 @@ def check_reference(
     body = ReferenceBody(reference)
     at = evaluate or (lambda t: body(FloatArithmetic(), t))
     name = reference.group.name
+    if isinstance(reference, PlanReference):
+        known, slack = reference.times[[0, -1]], 1e-9 * (reference.times[-1] - reference.times[0])
+        if t0 < known[0] - slack or t1 > known[1] + slack:
+            raise InputError(
+                f"the plan that is the reference on {name} is known on [{known[0]:g}, {known[1]:g}], not up to "
+                f"t = {t0 if t0 < known[0] - slack else t1:g}"
+            )
 
     def value(t: float) -> NDArray[Any]:
         try:

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.control.reference_motion import TIME, FormulaReference, Reference, WaypointReference, formula_reference
+from lie_codegen.control.plan_reference import Planned, plan_reference
+from lie_codegen.control.reference_motion import (
+    TIME,
+    FormulaReference,
+    PlanReference,
+    Reference,
+    WaypointReference,
+    formula_reference,
+)
 from lie_codegen.control.waypoints import waypoint_reference
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -147,7 +155,13 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
     ]
 
 
-@record_factory(group=as_group, times=doubles, waypoints=doubles, start=doubles)
+@overload
+def reference(
+    group: GroupLike, formulas: Planned, *, smoothing: float | None = None, tolerance: float = 1e-8
+) -> PlanReference: ...
+
+
+@overload
 def reference(
     group: GroupLike,
     formulas: Sequence[Any] | None = None,
@@ -155,21 +169,47 @@ def reference(
     times: ArrayLike | None = None,
     waypoints: ArrayLike | None = None,
     start: Any = None,
+    smoothing: float | None = None,
+    tolerance: float = 1e-8,
+) -> Reference: ...
+
+
+@record_factory(group=as_group, times=doubles, waypoints=doubles, start=doubles)
+def reference(
+    group: GroupLike,
+    formulas: Sequence[Any] | Planned | None = None,
+    *,
+    times: ArrayLike | None = None,
+    waypoints: ArrayLike | None = None,
+    start: Any = None,
+    smoothing: float | None = None,
+    tolerance: float = 1e-8,
 ) -> Reference:
-    """A reference from formulas of t, or from waypoints; its velocity and acceleration are derived.
+    """A reference from formulas of t, from a plan, or from waypoints; its velocity and acceleration are derived.
 
     Args:
         group: the group.
-        formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n).
+        formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n). Or the plan
+            of a manoeuvre, as `steer` makes it: then the reference says its `error` and what it rounds off (`PlanReference`).
         times, waypoints: (k,) and (k, d, d), instead of formulas.
         start: (d, d) for formulas.
+        smoothing: for a plan: the time before and after a jump of the controls in which it is rounded off [s]; a hundredth of the
+            duration if None.
+        tolerance: for a plan: on the entries of X, away from the jumps.
 
     Raises:
-        InputError: both or neither given; else as `formula_reference` and `waypoint_reference`.
+        InputError: both or neither given; else as `formula_reference`, `plan_reference` and `waypoint_reference`.
     """
     group = as_group(group, "reference")
     if (formulas is None) == (times is None or waypoints is None):
-        raise InputError(f"a reference on {group.name} is given by formulas, or by times and waypoints")
+        raise InputError(f"a reference on {group.name} is given by formulas, by a plan, or by times and waypoints")
+    if all(hasattr(formulas, name) for name in ("X", "u", "duration")):
+        if start is not None:
+            raise InputError("reference: a plan begins where it begins; start= goes with formulas")
+        return plan_reference(group, cast(Planned, formulas), smoothing=smoothing, tolerance=tolerance)
+    if smoothing is not None:
+        raise InputError("reference: smoothing= goes with a plan")
     if formulas is not None:
+        formulas = cast(Sequence[Any], formulas)
         return formula_reference(group, formulas, start=start)
     return waypoint_reference(group, np.asarray(times), np.asarray(waypoints))

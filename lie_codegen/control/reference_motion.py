@@ -1,9 +1,9 @@
-"""Reference trajectories as data: formulas of t, or waypoints to pass through. Velocities are derived, never asked for.
+"""Reference trajectories as data: formulas of t, waypoints to pass through, or a plan. Velocities are derived, never asked for.
 
     formulas   X_d(t) = X_0 exp(g_1(t) A_1) ... exp(g_n(t) A_n);  xi_d = M(g)^{-1} g', xi_d' its exact derivative
     waypoints  X_d(t) = X_i exp(hat(p_i(s))),  s = (t - t_i)/(t_{i+1} - t_i), p_i a quintic of the algebra
 
-Both are twice continuously differentiable, as Theorem 4.2 asks (Bullo and Murray, CIT-CDS 97-003).
+All are twice continuously differentiable, as Theorem 4.2 asks (Bullo and Murray, CIT-CDS 97-003).
 """
 
 from __future__ import annotations
@@ -22,12 +22,21 @@ from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
+from lie_codegen.values import Value
 
 TIME = sp.Symbol("t", real=True)
 
 
-@dataclass(frozen=True)
-class FormulaReference:
+class _Defined(Value):
+    """A value whose pickle keeps the definition that stands beside its fields."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        own = vars(self).get("definition")
+        return super().__getstate__() | ({} if own is None else {"definition": own})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FormulaReference(_Defined):
     """X_d(t) = X_0 exp(g_1(t) A_1) ... exp(g_n(t) A_n).
 
     Attributes:
@@ -51,8 +60,8 @@ class FormulaReference:
         return tuple(sp.diff(entry, TIME) for entry in self.rates)
 
 
-@dataclass(frozen=True)
-class WaypointReference:
+@dataclass(frozen=True, eq=False, repr=False)
+class WaypointReference(_Defined):
     """Quintic segments of the algebra from waypoint to waypoint; at rest before the first and after the last.
 
     Attributes:
@@ -66,6 +75,22 @@ class WaypointReference:
     times: NDArray[Any]
     elements: NDArray[Any]
     coefficients: NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanReference(WaypointReference):
+    """A planned manoeuvre on [0, duration]: quintic segments that leave and meet the plan with its velocity and acceleration.
+
+    Attributes:
+        group, times, elements, coefficients: as those of `WaypointReference`.
+        smoothed: (j, 2) from when to when a jump of the controls is rounded off.
+        error: largest difference to an entry of X of the plan, at three places a segment, away from the jumps.
+        smoothing_error: the same within the jumps' surroundings, 0.0 where there is none.
+    """
+
+    smoothed: NDArray[Any]
+    error: float
+    smoothing_error: float
 
 
 Reference = FormulaReference | WaypointReference

@@ -65,13 +65,13 @@ def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLik
     weight = spans[1:] / (spans[1:] + spans[:-1])
     speed[1:-1] = weight[:, None] * mean[:-1] + (1 - weight)[:, None] * mean[1:]
     derivation = GroupDerivation(group)
-    table = [_quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
+    table = [quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
     return WaypointReference(group, t, X, np.array(table))
 
 
 def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: int) -> NDArray[Any]:
     relative = np.linalg.solve(X, Y)
-    x = _logarithm(group, relative)
+    x = logarithm(group, relative)
     if x is not None:
         return x
     raise InputError(
@@ -80,7 +80,7 @@ def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: i
     )
 
 
-def _logarithm(group: MatrixGroup, X: NDArray[Any]) -> NDArray[Any] | None:
+def logarithm(group: MatrixGroup, X: NDArray[Any]) -> NDArray[Any] | None:
     """The x with exp(hat(x)) = X, or None where the principal logarithm is not in the algebra."""
     derivation, ops = GroupDerivation(group), FloatArithmetic()
     try:
@@ -104,18 +104,27 @@ def _numbers(X: Sequence[Sequence[Any]]) -> NDArray[Any]:
     return np.array([[complex(z.re, z.im) if isinstance(z, Complex) else float(z) for z in row] for row in X])
 
 
-def _quintic(
-    derivation: GroupDerivation, move: NDArray[Any], first: NDArray[Any], last: NDArray[Any], span: float
+def quintic(
+    derivation: GroupDerivation,
+    move: NDArray[Any],
+    first: NDArray[Any],
+    last: NDArray[Any],
+    span: float,
+    bends: tuple[NDArray[Any], NDArray[Any]] | None = None,
 ) -> NDArray[Any]:
-    """(6, n): p(0) = 0, p(1) = move, body velocities first and last [1/s] and no body acceleration at either end."""
+    """(6, n): p(0) = 0, p(1) = move, body velocities first and last [1/s], body accelerations [1/s^2] zero if not given.
+
+    From xi = J(p) p': xi' = J(p) p'' + (dJ/dt) p', and (dJ/dt) p' = -[p', p']/2 = 0 at p = 0.
+    """
     ops = FloatArithmetic()
     inverse = np.array(jacobian(ops, derivation, [float(x) for x in move], "right", inverse=True), dtype=float)
     rate = inverse @ last * span
     dual = DualArithmetic(ops)
     moving = [dual.variable(float(a), {0: float(b)}) for a, b in zip(move, rate, strict=True)]
     turning = matvec(jacobian(dual, derivation, moving, "right", inverse=False), [float(r) for r in rate])
-    bend = -inverse @ np.array([float(tangent_of(x)) if isinstance(x, Dual) else 0.0 for x in turning])
+    begin, end = (np.zeros_like(move), np.zeros_like(move)) if bends is None else (b * span**2 for b in bends)
+    bend = inverse @ (end - np.array([float(tangent_of(x)) if isinstance(x, Dual) else 0.0 for x in turning]))
     start = first * span
     conditions = np.array([[1, 1, 1], [3, 4, 5], [6, 12, 20]], dtype=float)
-    rest = np.linalg.solve(conditions, np.array([move - start, rate - start, bend]))
-    return np.vstack([np.zeros_like(move), start, np.zeros_like(move), rest])
+    rest = np.linalg.solve(conditions, np.array([move - start - begin / 2, rate - start - begin, bend - begin]))
+    return np.vstack([np.zeros_like(move), start, begin / 2, rest])
