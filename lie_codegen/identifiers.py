@@ -43,7 +43,9 @@ def check_identifier(name: object, what: str) -> str:
     Raises:
         IdentifierError: naming `what` and the culprit.
     """
-    if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
+    if not isinstance(name, str):
+        raise IdentifierError(f"{what} is a {type(name).__name__}, not a C identifier: give a text")
+    if not _IDENTIFIER.fullmatch(name):
         raise IdentifierError(
             f"{what} {name!r} is not a C identifier: use letters, digits and underscores, a letter first"
         )

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 import sympy as sp
 
 from lie_codegen.errors import ExpressionError
+from lie_codegen.exact.budget import current_budget, digits, over
 from lie_codegen.exact.token_stream import Token, TokenStream
 
 _MAX_EXPONENT = 64
@@ -82,9 +83,11 @@ class _Parser(TokenStream):
 
     def expression(self) -> sp.Expr:
         self.deeper()
+        token = self.token
         value = self.term()
         while operator := self.accept("+", "-"):
             value = value + self.term() if operator == "+" else value - self.term()
+            value = self.bounded(value, token)
         self.depth -= 1
         return value
 
@@ -95,7 +98,7 @@ class _Parser(TokenStream):
             other = self.factor()
             if operator == "/" and other.is_zero:
                 raise self.error("division by zero", token)
-            value = value * other if operator == "*" else value / other
+            value = self.bounded(value * other if operator == "*" else value / other, token)
         return value
 
     def factor(self) -> sp.Expr:
@@ -116,7 +119,9 @@ class _Parser(TokenStream):
             raise self.error(f"an exponent must be an integer between -{_MAX_EXPONENT} and {_MAX_EXPONENT}", token)
         if exponent < 0 and base.is_zero:
             raise self.error("division by zero", token)
-        return base**exponent
+        if base not in (0, 1, -1) and (digits(base) - 1) * abs(int(exponent)) > current_budget().digits:
+            raise self.error(over("digits", "the power has too many digits"), token)
+        return self.bounded(base**exponent, token)
 
     def atom(self) -> sp.Expr:
         token = self.token
@@ -174,4 +179,4 @@ class _Parser(TokenStream):
         value = function(*arguments)
         if value.has(sp.zoo, sp.nan, sp.oo, -sp.oo):
             raise self.error(f"{token.text} has no finite value there", token)
-        return value
+        return self.bounded(value, token)

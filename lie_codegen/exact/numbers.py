@@ -13,6 +13,7 @@ from sympy.polys.constructor import construct_domain
 from sympy.polys.matrices import DomainMatrix
 
 from lie_codegen.errors import InputError, NotFiniteError
+from lie_codegen.exact.budget import current_budget, field_degree, integer_digits, over, require_within
 from lie_codegen.exact.expression import parse_number
 
 #: An exact number: what `exact_number` returns.
@@ -34,12 +35,17 @@ def exact_number(value: Any) -> Number:
     if isinstance(value, bool | np.bool_):
         raise InputError(f"{value!r} is not a number")
     if isinstance(value, int | np.integer):
+        if integer_digits(int(value)) > current_budget().digits:
+            raise InputError(over("digits", "a number has too many digits"))
         return sp.Integer(int(value))
     if isinstance(value, Fraction):
-        return sp.Rational(value.numerator, value.denominator)
+        return require_within(sp.Rational(value.numerator, value.denominator))
     if isinstance(value, Decimal):
         if not value.is_finite():
             raise NotFiniteError(f"{value} is not finite")
+        most = current_budget().digits
+        if abs(value.adjusted()) > most or len(value.as_tuple().digits) > most:
+            raise InputError(over("digits", f"a number of more than {most} digits"))
         return sp.Rational(str(value))
     if isinstance(value, complex | np.complexfloating):
         return exact_number(float(value.real)) + sp.I * exact_number(float(value.imag))
@@ -54,7 +60,7 @@ def exact_number(value: Any) -> Number:
             raise InputError(f"{value} is not a number")
         if value.has(sp.Float):
             raise InputError(f"{value} holds a decimal of finite precision; write it as a fraction or a text")
-        return sp.expand(value)
+        return sp.expand(require_within(value))
     raise InputError(f"{value!r} ({type(value).__name__}) is not a number")
 
 
@@ -83,6 +89,8 @@ def field_elements(values: Sequence[Number]) -> tuple[Any, list[Any]]:
         from sympy.polys.domains import QQ
 
         return QQ, [QQ.from_sympy(value) for value in values]
+    if field_degree(list(values)) > current_budget().degree:
+        raise InputError(over("degree", "the roots in the entries together span a field of too high a degree"))
     domain, elements = construct_domain(list(values), field=True, extension=True)
     return domain, list(elements)
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import sympy as sp
 
 from lie_codegen.errors import ExpressionError
+from lie_codegen.exact.budget import complaint, current_budget, over
 
 _MAX_LENGTH = 4000
-_MAX_DEPTH = 60
-_MAX_DIGITS = 400
 _WORDS = r"\s*(?:(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<op>\*\*|[-+*/^()%s]))"
 
 
@@ -59,9 +58,16 @@ class TokenStream:
     def number(self, token: Token) -> sp.Rational:
         """The exact value of a number: "0.1" is 1/10."""
         mantissa, _, exponent = token.text.lower().partition("e")
-        if len(mantissa) > _MAX_DIGITS or (exponent and (len(exponent) > 5 or abs(int(exponent)) > _MAX_DIGITS)):
-            raise self.error(f"a number of more than {_MAX_DIGITS} digits", token)
-        return sp.Rational(token.text)
+        most = current_budget().digits
+        if len(mantissa) > most + 1 or (exponent and (len(exponent) > 9 or abs(int(exponent)) > most)):
+            raise self.error(over("digits", f"a number of more than {most} digits"), token)
+        return self.bounded(sp.Rational(token.text), token)
+
+    def bounded(self, value: sp.Expr, token: Token) -> sp.Expr:
+        """The value, when it is within the budget."""
+        if why := complaint(value):
+            raise self.error(why, token)
+        return value
 
     def end(self) -> None:
         """Nothing may be left."""
@@ -71,8 +77,9 @@ class TokenStream:
     def deeper(self) -> None:
         """One more level of nesting; the caller takes it back."""
         self.depth += 1
-        if self.depth > _MAX_DEPTH:
-            raise self.error(f"nested more than {_MAX_DEPTH} deep")
+        most = current_budget().nesting
+        if self.depth > most:
+            raise self.error(over("nesting", f"nested more than {most} deep"))
 
 
 def _tokens(text: str, pattern: re.Pattern[str]) -> list[Token]:

@@ -101,6 +101,9 @@ def definition_source(name_or_path: str | Path) -> bytes:
         return f"family {plain_name(name_or_path)}".encode()
     path = group_path(name_or_path)
     try:
+        # A pipe or a device may never end: only files are read.
+        if path.exists() and not path.is_file():
+            raise GroupFileError(f"{path}: cannot be read: it is not a file; a piped group file is named '-'")
         return path.read_bytes()
     except OSError as error:
         raise GroupFileError(f"{path}: cannot be read: {error.strerror or error}") from None

@@ -10,6 +10,7 @@ import sympy as sp
 
 from lie_codegen.algebra.constructions import algebra_from_brackets, algebra_from_matrices
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.budget import current_budget, over, shown
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.representation import faithful_representation
@@ -40,7 +41,7 @@ def from_matrices(
     check_identifier(name, "name")
     labels = _labels(name, labels)
     if isinstance(matrices, str) or not hasattr(matrices, "__len__"):
-        raise InputError(f"{name}: matrices must be a list of matrices, one for each label, got {matrices!r}")
+        raise InputError(f"{name}: matrices must be a list of matrices, one for each label, got {shown(matrices)}")
     if len(matrices) != len(labels):
         raise ShapeError(f"{name}: {len(labels)} labels for {len(matrices)} matrices; give one matrix for each label")
     exact = tuple(exact_matrix(f"{name}: matrix {label}", m) for label, m in zip(labels, matrices, strict=True))
@@ -95,12 +96,14 @@ def exact_matrix(where: str, rows: Any) -> sp.ImmutableMatrix:
     """
     table = rows.tolist() if hasattr(rows, "tolist") else rows
     if isinstance(table, str) or not isinstance(table, Sequence) or not table:
-        raise ShapeError(f"{where}: expected a list of rows, got {rows!r}")
+        raise ShapeError(f"{where}: expected a list of rows, got {shown(rows)}")
     for number, row in enumerate(table, start=1):
         if isinstance(row, str) or not isinstance(row, Sequence):
-            raise ShapeError(f"{where}: row {number} is not a list of entries but {row!r}")
+            raise ShapeError(f"{where}: row {number} is not a list of entries but {shown(row)}")
         if len(row) != len(table):
             raise ShapeError(f"{where}: row {number} has {len(row)} entries in a matrix of {len(table)} rows (ragged)")
+    if len(table) > current_budget().dimension:
+        raise InputError(over("dimension", f"{where}: {len(table)} rows"))
     entries = []
     for r, row in enumerate(table, start=1):
         for k, value in enumerate(row, start=1):
@@ -113,7 +116,9 @@ def exact_matrix(where: str, rows: Any) -> sp.ImmutableMatrix:
 
 def _labels(name: str, labels: Sequence[str]) -> tuple[str, ...]:
     if isinstance(labels, str) or not isinstance(labels, Sequence):
-        raise InputError(f"{name}: labels must be a list of names, got {labels!r}")
+        raise InputError(f"{name}: labels must be a list of names, got {shown(labels)}")
+    if len(labels) > current_budget().dimension:
+        raise InputError(over("dimension", f"{name}: {len(labels)} labels"))
     return tuple(labels)
 
 

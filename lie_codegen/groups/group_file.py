@@ -13,18 +13,21 @@ J = [[0, "-1/2"], ["sqrt(3)/2", 0]]
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
 from lie_codegen.errors import ExpressionError, GroupFileError, InputError, ShapeError
+from lie_codegen.exact.budget import current_budget, over, shown
 from lie_codegen.exact.numbers import Number, exact_number
 from lie_codegen.groups.definition import from_brackets, from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 _KEYS = ("name", "labels", "description", "source", "units", "matrices", "brackets", "metadata")
-_MAX_BYTES = 1_000_000
+#: A dotted key from its first part on; the parser of TOML takes time that grows with the square of its length.
+_DOTTED = r"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){%d}"""
 
 
 def parse_group_file(data: bytes, where: str) -> MatrixGroup:
@@ -34,11 +37,17 @@ def parse_group_file(data: bytes, where: str) -> MatrixGroup:
         GroupFileError: not TOML, a key unknown or missing, an entry that is not a number; names file, key and column.
         InputError: what the definition itself violates (closure, independence, Jacobi, names), prefixed by `where`.
     """
-    if len(data) > _MAX_BYTES:
-        raise GroupFileError(f"{where}: {len(data)} bytes; a group file has at most {_MAX_BYTES}")
+    budget = current_budget()
+    if len(data) > budget.size:
+        raise GroupFileError(over("size", f"{where}: {len(data)} bytes; a group file has at most {budget.size}"))
     try:
-        table = tomllib.loads(data.decode("utf-8"), parse_float=Decimal)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        text = data.decode("utf-8")
+        if re.search(_DOTTED % budget.nesting, text):
+            raise GroupFileError(over("nesting", f"{where}: a dotted key has too many parts"))
+        table = tomllib.loads(text, parse_float=Decimal)
+    except GroupFileError:
+        raise
+    except (ValueError, ArithmeticError, RecursionError) as error:  # a TOML error, an integer of 5,000 digits, ...
         raise GroupFileError(f"{where}: not a TOML file: {error}") from None
     return group_from_table(table, where)
 
@@ -80,14 +89,16 @@ def _check_keys(table: Mapping[str, Any], where: str) -> None:
 def _text(table: Mapping[str, Any], key: str, where: str, default: str | None = None) -> str:
     value = table.get(key, default)
     if not isinstance(value, str):
-        raise GroupFileError(f"{where}: key {key!r} must be a text, got {value!r}")
+        raise GroupFileError(f"{where}: key {key!r} must be a text, got {shown(value)}")
     return value
 
 
 def _texts(table: Mapping[str, Any], key: str, where: str) -> list[str]:
     value = table[key]
     if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
-        raise GroupFileError(f"{where}: key {key!r} must be a non-empty list of texts, got {value!r}")
+        raise GroupFileError(f"{where}: key {key!r} must be a non-empty list of texts, got {shown(value)}")
+    if len(value) > current_budget().dimension:
+        raise GroupFileError(over("dimension", f"{where}: {len(value)} labels"))
     return value
 
 
@@ -125,6 +136,8 @@ def _matrices(value: Any, labels: list[str], where: str) -> list[Any]:
 def _matrix(rows: Any, where: str, key: str) -> list[list[Number]]:
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
         raise GroupFileError(f"{where}: key {key!r} must be a list of rows")
+    if len(rows) > current_budget().dimension:
+        raise GroupFileError(over("dimension", f"{where}: key {key!r}: {len(rows)} rows"))
     for number, row in enumerate(rows, start=1):
         if len(row) != len(rows):
             raise ShapeError(
@@ -146,7 +159,7 @@ def _brackets(value: Any, labels: list[str], where: str) -> dict[tuple[str, str]
         if len(names) != 2:
             raise GroupFileError(f'{where}: key {key} must name two labels, as in "x,y"')
         if not isinstance(combination, dict):
-            raise GroupFileError(f"{where}: key {key} must be a table of label = coefficient, got {combination!r}")
+            raise GroupFileError(f"{where}: key {key} must be a table of label = coefficient, got {shown(combination)}")
         for label in (*names, *combination):
             if label not in labels:
                 raise GroupFileError(f"{where}: key {key}: {label!r} is not one of the labels {', '.join(labels)}")
@@ -161,7 +174,9 @@ def _brackets(value: Any, labels: list[str], where: str) -> dict[tuple[str, str]
 
 def _number(entry: Any, where: str, key: str) -> Number:
     if isinstance(entry, bool) or not isinstance(entry, int | str | Decimal):
-        raise GroupFileError(f"{where}: key {key}: {entry!r} is not a number; write an integer, a decimal or a text")
+        raise GroupFileError(
+            f"{where}: key {key}: {shown(entry)} is not a number; write an integer, a decimal or a text"
+        )
     try:
         return exact_number(entry)
     except ExpressionError as error:

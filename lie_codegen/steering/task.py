@@ -14,9 +14,14 @@ from lie_codegen.algebra.controllability import Controllability, control_indices
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
+from lie_codegen.exact.budget import shown
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.accessibility import with_drift
+
+#: Durations in seconds that double precision carries.
+_SHORTEST = 1e-100
+_LONGEST = 1e100
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,20 @@ class Task:
     duration: float
     tolerance: float
     report: Controllability
+
+
+def check_duration(duration: object, where: str) -> None:
+    """A duration in seconds whose square, and that of controls of about 1 / duration, stay in the range of a double.
+
+    Raises:
+        SteeringInputError: it is no such number.
+    """
+    real = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
+    if not real or not _SHORTEST <= duration <= _LONGEST:  # type: ignore[operator]  # NaN fails the comparison
+        raise SteeringInputError(
+            f"{where}: duration must be a positive number of seconds between {_SHORTEST:g} and {_LONGEST:g}, "
+            f"got {shown(duration)}"
+        )
 
 
 def make_task(
@@ -62,10 +81,7 @@ def make_task(
     report = _reach(group.algebra, control_indices(group.algebra, controls))
     if not report.controllable and not torques:
         _require_drift_helps(group, report, drift)
-    if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
-        raise SteeringInputError(
-            f"steer({group.name}): duration must be a positive number of seconds, got {duration!r}"
-        )
+    check_duration(duration, f"steer({group.name})")
     if not tolerance > 0:
         raise InputError(f"steer({group.name}): tolerance must be positive, got {tolerance!r}")
     element = group_element(group, target, f"steer({group.name}): target")

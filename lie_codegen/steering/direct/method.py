@@ -33,6 +33,7 @@ from lie_codegen.steering.direct.search import LARGE, Budget, Found, search
 from lie_codegen.steering.direct.system import System, controls_of, velocity
 from lie_codegen.steering.goals import end_of
 from lie_codegen.steering.plan import Plan, Status
+from lie_codegen.steering.task import check_duration
 
 _OBJECTIVES = ("energy", "fuel", "time", "none")
 _FUEL_TIMES = 4
@@ -172,8 +173,7 @@ def manoeuvre(
     """
     require_group(group, "steer")
     where = f"steer({group.name})"
-    if not isinstance(duration, int | float | np.number) or not np.isfinite(duration) or not duration > 0:
-        raise SteeringInputError(f"{where}: duration must be a positive number of seconds, got {duration!r}")
+    check_duration(duration, where)
     labels, directions = controls_of(group, controls, where)
     free = velocity(group, np.zeros(group.dim) if drift is None else drift, f"{where}: drift")
     eye = np.eye(group.degree, dtype=group.basis.dtype)

@@ -1,0 +1,115 @@
+"""Work without a budget, and errors that are not ours: numbers, formulas and durations."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import pytest
+import sympy as sp
+
+import lie_codegen as lc
+from lie_codegen.errors import InputError
+from lie_codegen.exact.budget import Budget, current_budget, field_degree
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, parse_number
+from lie_codegen.exact.numbers import exact_number, field_elements
+
+
+@pytest.fixture(autouse=True)
+def alarm() -> Iterator[None]:
+    """Nothing here may hang."""
+
+    def ring(*_: Any) -> None:
+        raise TimeoutError("ten seconds")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.alarm(10)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+SIX_ROOTS = "+".join(f"sqrt({p})" for p in (2, 3, 5, 7, 11, 13))
+
+
+@pytest.mark.parametrize(
+    ("value", "limit"),
+    [
+        ("(1+sqrt(2)+sqrt(3)+pi)^64", "terms"),
+        ("((9^64)^64)^64", "digits"),
+        (SIX_ROOTS, "degree"),
+        (f"1/({SIX_ROOTS})", "degree"),
+        ("11e400", "digits"),
+        ("1e1000000", "digits"),
+        ("9" * 3000, "digits"),
+        (10**5000, "digits"),
+        (Decimal("1e1000000"), "digits"),
+        (Fraction(1, 10**5000), "digits"),
+        (sp.Integer(10) ** 5000, "digits"),
+        ("(" * 70 + "1" + ")" * 70, "nesting"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_a_number_over_the_budget_names_its_limit(value: Any, limit: str) -> None:
+    with pytest.raises(InputError, match=rf"limit of {limit} is .*Budget\({limit}="):
+        exact_number(value)
+
+
+def test_roots_of_several_entries_are_counted_together() -> None:
+    with pytest.raises(InputError, match="limit of degree"):
+        field_elements([sp.sqrt(p) for p in (2, 3, 5, 7, 11, 13)])
+
+
+@pytest.mark.parametrize(
+    ("text", "degree"),
+    [("sqrt(2)+sqrt(3)+sqrt(6)", 4), ("sqrt(2)+i", 4), ("sqrt(8)/3", 2), ("pi/7", 1), ("sqrt(2)*sqrt(3)", 2)],
+)
+def test_the_degree_is_that_of_the_field(text: str, degree: int) -> None:
+    value = parse_number(text)
+    assert field_degree([value]) == degree
+    if not value.has(sp.pi):
+        assert sp.degree(sp.minimal_polynomial(value)) <= degree
+
+
+def test_a_budget_is_raised_and_given_back() -> None:
+    before = current_budget()
+    with Budget(digits=5000):
+        assert exact_number(10**4000) == sp.Integer(10) ** 4000
+        with Budget(degree=1), pytest.raises(InputError, match="limit of degree is 1"):
+            exact_number("sqrt(2)")
+        assert current_budget() == Budget(digits=5000)
+    assert current_budget() == before
+    with pytest.raises(InputError, match="digits must be a positive integer"):
+        Budget(digits=0)
+
+
+def test_a_formula_is_bounded_in_its_digits() -> None:
+    t = sp.Symbol("t")
+    with pytest.raises(InputError, match="limit of digits"):
+        parse_expression("sin(11e400*t)", {"t": t}, FORMULA_FUNCTIONS)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: lc.PeriodicInput(["11e400*sin(t)"]),
+        lambda: lc.PeriodicInput(["sin(t)"], period="11e400"),
+        lambda: lc.PeriodicInput(["sin(t)"], period=11 * 10**400),
+    ],
+)
+def test_inputs_and_periods_beyond_a_double(call: Callable[[], object]) -> None:
+    with pytest.raises(InputError):
+        call()
+
+
+@pytest.mark.parametrize(
+    "duration",
+    [1e-300, 1e300, True, 10**400, 10**5000, float("nan"), -1.0, "1"],
+    ids=lambda value: type(value).__name__,
+)
+def test_durations_the_arithmetic_cannot_carry(duration: Any) -> None:
+    with pytest.raises(InputError, match="duration must be"):
+        lc.steer("so3", [0.1, 0.2, 0.3], controls=["w1", "w2"], duration=duration)
