@@ -26,7 +26,8 @@ class Value:
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
     def __getstate__(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self)}
+        kept = (*(each.name for each in fields(self)), "definition")  # of a factory's record, beside its fields
+        return {name: vars(self)[name] for name in kept if name in vars(self)}
 
     def __eq__(self, other: object) -> bool:
         if self is other:

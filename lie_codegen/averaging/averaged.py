@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,7 @@ from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, N
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of
@@ -30,8 +31,8 @@ _THEOREMS = {"product": "Theorem 3 (area rule)", "single": "Theorem 4 (single-ex
 _MOST = 32
 
 
-@dataclass(frozen=True, eq=False)
-class Averaged:
+@dataclass(frozen=True, eq=False, repr=False)
+class Averaged(Saved):
     """The average of X' = eps X hat(u(t)), X(0) = X0, with error O(eps^order) on [0, b / eps].
 
     floquet, any order p and any mean:  X0 exp(t sum_{q<=p} eps^q F_q) exp(sum_{q<p} eps^q Lambda_q(t)).
@@ -52,9 +53,19 @@ class Averaged:
     order: int
     form: str
     X0: Array
-    exact_F: tuple[sp.ImmutableMatrix, ...]
-    _calculus: Any
-    _signals: tuple[Any, ...]
+    exact_F: tuple[sp.ImmutableMatrix, ...] = field(repr=False, compare=False, metadata={"derived": True})
+    _calculus: Any = field(repr=False, compare=False, metadata={"derived": True})
+    _signals: tuple[Any, ...] = field(repr=False, compare=False, metadata={"derived": True})
+
+    @classmethod
+    def restored(cls, group: MatrixGroup, u: PeriodicInput, order: int, form: str, X0: Array) -> Averaged:
+        """The average of the same input again; what was warned of was warned of when it was first made."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AssumptionWarning)
+            return average(group, u, order, form, X0=X0)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Averaged.restored, (self.group, self.u, self.order, self.form, self.X0)
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:

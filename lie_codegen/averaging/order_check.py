@@ -16,6 +16,7 @@ from lie_codegen.flow.attitude_metrics import METRICS, distances
 from lie_codegen.flow.reference_flow import ReferenceFlow, reference_flow
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 #: state(eps, t) -> (k, d, d)
@@ -26,8 +27,8 @@ SHORTFALL = 0.15
 _FLOOR = 2e-13
 
 
-@dataclass(frozen=True)
-class OrderCheck:
+@dataclass(frozen=True, eq=False, repr=False)
+class OrderCheck(Saved):
     """sup over [0, b / eps] of the error of an average, for several eps, and the order it shows.
 
     Attributes:

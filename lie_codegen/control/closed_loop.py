@@ -21,6 +21,7 @@ from lie_codegen.groups.maps.element_pattern import packed_size
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.patience import shows_progress
@@ -31,8 +32,8 @@ _LARGEST_MOVE = 0.25
 _BLOCK = 20_000
 
 
-@dataclass(frozen=True)
-class ClosedLoop:
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosedLoop(Saved):
     """A solution of X' = X hat(xi), I xi' = ad*_xi I xi + f.
 
     Attributes:

@@ -22,21 +22,13 @@ from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 TIME = sp.Symbol("t", real=True)
 
 
-class _Defined(Value):
-    """A value whose pickle keeps the definition that stands beside its fields."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        own = vars(self).get("definition")
-        return super().__getstate__() | ({} if own is None else {"definition": own})
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class FormulaReference(_Defined):
+class FormulaReference(Saved):
     """X_d(t) = X_0 exp(g_1(t) A_1) ... exp(g_n(t) A_n).
 
     Attributes:
@@ -61,7 +53,7 @@ class FormulaReference(_Defined):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WaypointReference(_Defined):
+class WaypointReference(Saved):
     """Quintic segments of the algebra from waypoint to waypoint; at rest before the first and after the last.
 
     Attributes:

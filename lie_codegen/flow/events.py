@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.chandrupatla import roots
+from lie_codegen.kernel.saved import Saved
 
 #: Where g is looked at within a step, beside its ends: at no rational part of it.
 INNER = np.array([0.3090169943749474, 0.7071067811865476])
@@ -43,8 +44,8 @@ class Event:
             raise InputError(f"Event({self.formula!r}): direction is -1, 0 or 1, given {self.direction!r}")
 
 
-@dataclass(frozen=True, eq=False)
-class EventHits:
+@dataclass(frozen=True, eq=False, repr=False)
+class EventHits(Saved):
     """What was found of one event.
 
     Attributes:

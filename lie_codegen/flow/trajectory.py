@@ -21,12 +21,13 @@ from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.flow.refined import refined
 from lie_codegen.flow.restarts import Chart, restarted_charts
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 
 _WHOLE = np.array([0.0, 0.5, 1.0])
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Saved):
     """A solution of X' = X hat(eps u).
 
     Attributes:

@@ -66,8 +66,10 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name
                 lambda: given, namespace=_package_name(given, name), definition=defined_together(given)
             )
             require_kernels(whole, () if kernels == "all" else kernels)
+            whole.made_by(_build_kernels, given, name)
             return whole
         library = group_library(object_definition(group), lambda: group)
+        library.made_by(build, group)
     library.compile(library.kernels if kernels == "all" else kernels)
     return library
 
@@ -170,14 +172,24 @@ def object_definition(group: MatrixGroup) -> str:
 def _build_named(what: str | Path) -> GroupLibrary:
     from lie_codegen.groups.catalogue_names import definition_source
 
-    source = definition_source(what)
+    return _build_source(str(what), definition_source(what))
+
+
+def _build_source(what: str, source: bytes) -> GroupLibrary:
+    """The group of the text of a catalogue entry or a file: a file itself need not be where the library is made again."""
 
     def load() -> MatrixGroup:
         from lie_codegen.groups.catalogue_load import group_of_source
 
         return group_of_source(what, source)
 
-    return group_library(source_definition(source), load)
+    library = group_library(source_definition(source), load)
+    library.made_by(_build_source, str(what), source)
+    return library
+
+
+def _build_kernels(kernels: tuple[Kernel, ...], name: str | None) -> Library:
+    return build(kernels, name=name)
 
 
 def _kernels_of(group: MatrixGroup) -> tuple[Kernel, ...]:

@@ -128,6 +128,7 @@ class GroupLibrary(Library):
             if name not in self._made:
                 library = self._make(name)
                 self.__dict__[name] = library[name]
+                self.__dict__[name].belongs_to(self)
                 self._made[name] = library
         function: Compiled[Any] = self.__dict__[name]
         return function

@@ -123,9 +123,39 @@ def _encoded(value: Any, arrays: dict[str, Array], where: str) -> Any:
     if isinstance(value, Mapping):
         return {"mapping": [[str(k), _encoded(v, arrays, f"{where}[{k!r}]")] for k, v in value.items()]}
     if hasattr(type(value), "__dataclass_fields__") and type(value).__module__.split(".")[0] == "lie_codegen":
-        held = {f.name: _encoded(getattr(value, f.name), arrays, f"{where}.{f.name}") for f in fields(value) if f.init}
+        kept = [f.name for f in fields(value) if _is_kept(f)]
+        held = {name: _encoded(getattr(value, name), arrays, f"{where}.{name}") for name in kept}
         return {"record": _name_of(type(value)), "fields": held}
+    if type(value).__module__.startswith("sympy."):
+        return _formula(value, where)
     raise InputError(f"{where} cannot be saved: {type(value).__name__} is no data")
+
+
+def _is_kept(field: Any) -> bool:
+    """A field that the constructor takes and that does not follow from the others (metadata: {"derived": True})."""
+    return bool(field.init) and not field.metadata.get("derived")
+
+
+def _formula(value: Any, where: str) -> dict[str, Any]:
+    """A SymPy expression in the closed grammar of formulas, its symbols named; one that cannot be written so is refused."""
+    symbols = sorted(symbol.name for symbol in getattr(value, "free_symbols", ()))
+    record = {"formula": str(value), "symbols": symbols}
+    try:
+        readable = _read_formula(record) == value
+    except InputError:
+        readable = False
+    if not readable:
+        raise InputError(f"{where} cannot be saved: {value!s:.60} is no formula of the closed grammar")
+    return record
+
+
+def _read_formula(record: Mapping[str, Any]) -> Any:
+    import sympy as sp
+
+    from lie_codegen.exact.expression import FORMULA_FUNCTIONS, NUMBER_NAMES, parse_expression
+
+    names = {**NUMBER_NAMES, **{str(name): sp.Symbol(str(name), real=True) for name in record["symbols"]}}
+    return parse_expression(record["formula"], names, FORMULA_FUNCTIONS)
 
 
 def _name_of(kind: type) -> str:
@@ -163,12 +193,16 @@ def _record(record: dict[str, Any], arrays: Mapping[str, Array], path: str) -> A
     if "definition" in record:
         _check_kinds(record["definition"], path)
         return made_from(record["definition"])
+    if "formula" in record:
+        return _read_formula(record)
     made = _class_of(record["record"], path, enum=False)
-    known = {field.name for field in fields(made) if field.init}
+    known = {field.name for field in fields(made) if _is_kept(field)}
     unknown = sorted(set(record["fields"]) - known)
     if unknown:
         raise InputError(f"{path}: a {made.__name__} has no {', '.join(unknown)}; was it written by a later version?")
-    return made(**{name: _decoded(each, arrays, path) for name, each in record["fields"].items()})
+    held = {name: _decoded(each, arrays, path) for name, each in record["fields"].items()}
+    # a value whose derived fields the constructor does not find by itself says how it is made again
+    return getattr(made, "restored", made)(**held)
 
 
 def _class_of(name: str, path: str, *, enum: bool) -> Any:

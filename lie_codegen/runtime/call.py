@@ -36,6 +36,7 @@ class Compiled(Generic[Result]):
     """
 
     def __init__(self, signature: Signature, backend: Backend, *, compiled: bool) -> None:
+        self._library: Any = None
         self.name = self.__name__ = signature.name
         self.inputs = signature.inputs
         self.outputs = signature.outputs
@@ -245,9 +246,35 @@ class Compiled(Generic[Result]):
         values = [array.item() if scalars and array.ndim == 0 else array for array in outputs]
         return values[0] if self.result_type is None else self.result_type(*values)
 
+    def belongs_to(self, library: Any) -> None:
+        """The library of which it is a kernel: it pickles as that kernel of that library."""
+        self._library = library
+
+    def reduced(self) -> tuple[Any, ...]:
+        """How it is made again, for pickle."""
+        if self._library is None:
+            raise TypeError(f"the kernel {self.name} belongs to no library made by lc.build and cannot be pickled")
+        return _kernel_of, (self._library, self.name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.reduced()
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        alike = isinstance(other, Compiled) and self.signature == other.signature and self._library is not None
+        return alike and self._library == getattr(other, "_library", None)
+
+    def __hash__(self) -> int:
+        return hash(self.signature.symbol)
+
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
         return f"<{how} kernel {_prototype(self.signature)}>"
+
+
+def _kernel_of(library: Any, name: str) -> Any:
+    return library[name]
 
 
 def documentation(signature: Signature) -> str:

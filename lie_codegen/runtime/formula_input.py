@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.kernel.saved import Saved
 
 _NONE = np.empty(0)
 
 
-@dataclass(frozen=True, eq=False)
-class FormulaInput:
+@dataclass(frozen=True, eq=False, repr=False)
+class FormulaInput(Saved):
     """u(t) = sum_f cosines_f cos(w_f t) + sines_f sin(w_f t), plus on each piece a straight line.
 
     Attributes:

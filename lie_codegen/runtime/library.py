@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import WeakValueDictionary
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CodegenError, InputError
@@ -43,7 +44,33 @@ class Library:
         self.path = path
         self._notes = tuple(build_log)
         self._lanes = lanes
+        self._recipe: tuple[Any, ...] = ()
         self.__dict__.update({function.name: function for function in functions})
+
+    def made_by(self, make: Callable[..., Any], *arguments: Any) -> None:
+        """What makes this library again: it pickles as that, never as a path, and equals what is made alike."""
+        self._recipe = (make, *arguments)
+        _LIVE[self._recipe] = self
+        for function in self.__dict__.values():
+            if hasattr(function, "belongs_to"):
+                function.belongs_to(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if not self._recipe:
+            raise TypeError(f"the library {self.namespace} was not made by lc.build and cannot be pickled")
+        return _made_again, self._recipe
+
+    def __copy__(self) -> Library:
+        return self
+
+    def __deepcopy__(self, _: Any) -> Library:
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, Library) and bool(self._recipe) and self._recipe == other._recipe)
+
+    def __hash__(self) -> int:
+        return hash((self.namespace, self.kernels))
 
     @property
     def build_log(self) -> tuple[str, ...]:
@@ -78,6 +105,17 @@ class Library:
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
         return f"<{how} library {self.namespace}: {', '.join(self.kernels)}>"
+
+
+#: Libraries in use, by what makes them: one process builds and opens each once.
+_LIVE: WeakValueDictionary[tuple[Any, ...], Library] = WeakValueDictionary()
+
+
+def _made_again(*recipe: Any) -> Library:
+    live = _LIVE.get(recipe)
+    make, *arguments = recipe
+    made: Library = live if live is not None else make(*arguments)
+    return made
 
 
 def require_kernels(library: Library, names: Iterable[str]) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import ctypes
 from functools import cache, wraps
 from typing import Any, cast
@@ -36,7 +37,13 @@ def quick(compiled: Compiled[Any], library: ctypes.CDLL, lanes: LaneLibrary, sig
 
     call = _address(library, f"{signature.symbol}_call")
     fast = module.function(call, 0, inputs, outputs, compiled, compiled, samples, compiled.result_type)
+    copyreg.pickle(type(fast), _reduced)  # the type is compiled with the extension, so it cannot say this itself
     return cast("Compiled[Any]", fast)
+
+
+def _reduced(fast: Any) -> tuple[Any, ...]:
+    reduced: tuple[Any, ...] = fast.reduced()
+    return reduced
 
 
 def _address(library: ctypes.CDLL, symbol: str) -> int:

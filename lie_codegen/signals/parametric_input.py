@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.kernel.saved import Saved
 
 _TIME = sp.Symbol("t", real=True)
 
@@ -32,8 +33,8 @@ class Waves:
     evaluate: Callable[..., Sequence[Any]]
 
 
-@dataclass(frozen=True)
-class ParametricInput:
+@dataclass(frozen=True, eq=False, repr=False)
+class ParametricInput(Saved):
     """u(t; p), callable: u(t, a=.5, w=1.1) is (n,) for a scalar t and (k, n) for (k,) times.
 
     Attributes:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.formula_tables import periodic_formula
 from lie_codegen.signals.input_formulas import (
@@ -28,15 +29,15 @@ from lie_codegen.signals.input_formulas import (
     symbol_of,
 )
 from lie_codegen.signals.piecewise_waveform import piecewise_waveform
-from lie_codegen.signals.sampled_signal import resolve
+from lie_codegen.signals.sampled_signal import Interpolated, Panels, resolve
 from lie_codegen.signals.trig_formula import NotTrigonometricError
 from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
 
 __all__ = ["TIME", "PeriodicInput"]
 
 
-@dataclass(frozen=True, eq=False)
-class PeriodicInput:
+@dataclass(frozen=True, eq=False, repr=False)
+class PeriodicInput(Saved):
     """u(t) with u(t + T) = u(t), callable: u(t) is (n,) for a scalar t and (..., n) for an array.
 
     Sums, products and integer powers of sines and cosines of commensurate frequencies are kept as exact trigonometric
@@ -48,6 +49,9 @@ class PeriodicInput:
         period: T as a text, a number or a SymPy expression; the smallest common period if not given. [time unit]
         parameters: names of symbolic amplitudes and phases.
         breakpoints: times in (0, T) at which u or a derivative jumps.
+        pieces: of an input in pieces, (end, formulas) of each.
+        table: of a function, the edges of panels of [0, T] and its values at their Chebyshev nodes. They stand for the function in
+            comparisons, and in a pickle or a file: the copy interpolates, to rounding where the function is smooth.
 
     Raises:
         ExpressionError: a text outside the grammar, with the column.
@@ -59,7 +63,9 @@ class PeriodicInput:
     period: Any = None
     parameters: Sequence[str] = ()
     breakpoints: Sequence[float] = ()
-    waveform: Waveform = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
+    waveform: Waveform = field(default=None, repr=False, compare=False, metadata={"derived": True})  # type: ignore[assignment]
+    pieces: tuple[tuple[Any, ...], ...] = field(default=(), repr=False)
+    table: tuple[Array, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         names = (self.parameters,) if isinstance(self.parameters, str) else tuple(self.parameters)
@@ -68,12 +74,26 @@ class PeriodicInput:
             raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {self.components!r}")
         object.__setattr__(self, "components", tuple(self.components))
         if self.waveform is None:
-            object.__setattr__(
-                self, "waveform", formula_waveform(self.components, self.period, names, self.breakpoints)
-            )
+            object.__setattr__(self, "waveform", self._made(names))
         object.__setattr__(self, "period", self.waveform.period)
         inside = tuple(sorted(float(b) for b in self.breakpoints))
         object.__setattr__(self, "breakpoints", inside)
+
+    def _made(self, names: tuple[str, ...]) -> Waveform:
+        """The waveform, from pieces, a table or formulas."""
+        if self.pieces:
+            symbols = tuple(symbol_of(name) for name in names)
+            return piecewise_waveform(
+                [end for end, _ in self.pieces], [list(row) for _, row in self.pieces], TIME, symbols
+            )
+        if self.table:
+            panels, values = Panels(self.table[0]), self.table[1]
+            return SampledWaveform(panels, values, Interpolated(panels, values), period_of(self.period, {}))
+        return formula_waveform(self.components, self.period, names, self.breakpoints)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        given = (self.components, self.period, self.parameters, self.breakpoints)
+        return PeriodicInput, (*given, None, self.pieces, self.table)
 
     def as_formula(self, start: float, end: float) -> FormulaInput | None:
         """u on [start, end] as a compiled loop evaluates it; None where it is neither a Fourier series nor straight pieces."""
@@ -126,7 +146,8 @@ class PeriodicInput:
             raise ShapeError(f"PeriodicInput.from_callable: 3 times gave shape {probe.shape}; they must give (3, n)")
         panels, values = resolve(lambda t: np.asarray(function(t), dtype=float), length, breakpoints)
         waveform = SampledWaveform(panels, values, lambda t: np.asarray(function(t), dtype=float), exact)
-        return PeriodicInput(("",) * probe.shape[1], exact, (), tuple(breakpoints), waveform)
+        names = ("a function",) * probe.shape[1]
+        return PeriodicInput(names, exact, (), tuple(breakpoints), waveform, table=(panels.edges, values))
 
     @staticmethod
     def from_samples(values: ArrayLike, period: Any) -> PeriodicInput:
@@ -172,7 +193,8 @@ class PeriodicInput:
         names = ("in pieces",) * len(formulas[0])
         try:
             waveform = piecewise_waveform(ends, formulas, TIME, tuple(symbols.values()))
-            return PeriodicInput(names, ends[-1], tuple(symbols), inside, waveform)
+            given = tuple((end, tuple(row)) for end, row in zip(ends, formulas, strict=True))
+            return PeriodicInput(names, ends[-1], tuple(symbols), inside, waveform, given)
         except (NotTrigonometricError, PeriodError):
             free = set().union(*(f.free_symbols for row in formulas for f in row)) - {TIME}
             if free:
@@ -181,6 +203,10 @@ class PeriodicInput:
                     "polynomials in t with sines and cosines of commensurate rates"
                 ) from None
         return PeriodicInput.from_callable(pieces_function(moments, formulas), ends[-1], breakpoints=inside)
+
+    @property
+    def _named(self) -> dict[str, sp.Symbol]:
+        return {name: symbol_of(name) for name in self.parameters}
 
     @property
     def dim(self) -> int:
@@ -270,7 +296,9 @@ class PeriodicInput:
         left = tuple(name for name in self.parameters if name not in values)
         if not isinstance(self.waveform, TrigWaveform):
             raise InputError("PeriodicInput.at: put the numbers into the formulas of an input in pieces")
-        return PeriodicInput(self.components, None, left, self.breakpoints, with_values(self.waveform, numbers))
+        components = tuple(formula_of(each, self._named).subs(numbers) for each in self.components)
+        period = period_of(self.period, self._named).subs(numbers)
+        return PeriodicInput(components, period, left, self.breakpoints, with_values(self.waveform, numbers))
 
     def linear(self, matrix: Any) -> PeriodicInput:
         """C u for a constant (m, n) matrix (exact entries, or floats at their exact binary value).
@@ -286,7 +314,8 @@ class PeriodicInput:
         if isinstance(self.waveform, TrigWaveform):
             form = linear_image(self.waveform.form, exact)
             moved = TrigWaveform(form, self.waveform.order)
-            return PeriodicInput(("",) * exact.rows, self.period, self.parameters, self.breakpoints, moved)
+            components = tuple(exact * sp.Matrix([formula_of(each, self._named) for each in self.components]))
+            return PeriodicInput(components, self.period, self.parameters, self.breakpoints, moved)
         numeric = np.array(exact.tolist(), dtype=float)
         inner = self.waveform
         return PeriodicInput.from_callable(lambda t: self(t) @ numeric.T, inner.period, breakpoints=self.breakpoints)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError
+from lie_codegen.values import Value
 
 TERMS = 9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(TERMS)
@@ -33,8 +34,8 @@ _BLOCK = 2**20
 _SHORT = 1e-5
 
 
-@dataclass(frozen=True, eq=False)
-class ResolvedInput:
+@dataclass(frozen=True, eq=False, repr=False)
+class ResolvedInput(Value):
     """u(t) as Legendre series of degree 8 on pieces.
 
     Attributes:

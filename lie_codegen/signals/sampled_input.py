@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput, lines_input
 
 
-@dataclass(frozen=True, eq=False)
-class SampledInput:
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledInput(Saved):
     """u(t) from values at times, as a flight computer or a log gives them.
 
     between="constant": u = values_k on [times_k, times_k+1), m values and m + 1 times; steps end exactly at the times.
@@ -35,7 +36,7 @@ class SampledInput:
     times: ArrayLike
     values: ArrayLike
     between: Literal["constant", "linear"] = "constant"
-    formula: FormulaInput = field(init=False, repr=False)
+    formula: FormulaInput = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.between not in ("constant", "linear"):

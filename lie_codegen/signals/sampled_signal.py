@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.signals.trig_signal import Brackets
+from lie_codegen.values import Value
 
 #: Nodes of a panel.
 NODES = 24
@@ -78,6 +79,18 @@ class Panels:
         coefficients = np.einsum("km,pmn->pkn", _rules()[1], values)[panel]
         basis = chebyshev.chebvander(x, NODES - 1)
         return np.asarray(np.einsum("tk,tkn->tn", basis, coefficients)).reshape(*np.shape(t), values.shape[2])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Interpolated(Value):
+    """The function that takes values at the nodes of panels: (k,) times of [0, T] -> (k, n)."""
+
+    panels: Panels
+    values: Array
+
+    def __call__(self, t: Array) -> Array:
+        """(k,) -> (k, n)."""
+        return self.panels.interpolate(self.values, t)
 
 
 def resolve(function: Callable[[Array], Array], period: float, breakpoints: Sequence[float]) -> tuple[Panels, Array]:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.resolved_input import ResolvedInput
 
 
-@dataclass(frozen=True, eq=False)
-class Drive:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drive(Saved):
     """factor u(t): waves and straight pieces of a FormulaInput, or the Legendre pieces of a function that was resolved.
 
     Attributes:
