@@ -464,6 +464,20 @@ static PyObject *get_doc(PyObject *object, void *closure)
     return PyObject_GetAttrString(((Function *)object)->owner, "__doc__");
 }
 
+/* Equal where their owners are: a kernel that was pickled equals the one it was made from. */
+static PyObject *compare(PyObject *self, PyObject *other, int operation)
+{
+    if (Py_TYPE(self) != Py_TYPE(other) || (operation != Py_EQ && operation != Py_NE)) {
+        Py_RETURN_NOTIMPLEMENTED;
+    }
+    return PyObject_RichCompare(((Function *)self)->owner, ((Function *)other)->owner, operation);
+}
+
+static Py_hash_t hash_of(PyObject *self)
+{
+    return PyObject_Hash(((Function *)self)->owner);
+}
+
 static PyObject *represent(PyObject *object)
 {
     return PyObject_Repr(((Function *)object)->owner);
@@ -494,6 +508,8 @@ static PyTypeObject FunctionType = {
     .tp_vectorcall_offset = offsetof(Function, vectorcall),
     .tp_repr = represent,
     .tp_call = PyVectorcall_Call,
+    .tp_richcompare = compare,
+    .tp_hash = hash_of,
     .tp_getattro = get_attribute,
     .tp_flags = Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_VECTORCALL | Py_TPFLAGS_HAVE_GC,
     .tp_traverse = traverse,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.values import Value
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
@@ -26,8 +27,8 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 NAMESPACE = "vibrational"
 
 
-@dataclass(frozen=True)
-class VibrationalAverage:
+@dataclass(frozen=True, eq=False, repr=False)
+class VibrationalAverage(Value):
     """The averaged system of y' = X(y) + (1/eps) Y_a(q) u^a(t / eps).
 
     Attributes:

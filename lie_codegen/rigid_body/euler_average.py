@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.values import Value
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
@@ -43,8 +44,8 @@ class Averaged(NamedTuple):
     G: Array
 
 
-@dataclass(frozen=True)
-class EulerAverage:
+@dataclass(frozen=True, eq=False, repr=False)
+class EulerAverage(Value):
     """The variational equations of a perturbed free rigid body, and their averages, per unit eps.
 
     Attributes:

@@ -12,10 +12,11 @@ from lie_codegen.arrays import Array
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
+from lie_codegen.values import Value
 
 
-@dataclass(frozen=True, eq=False)
-class OptimalPlan:
+@dataclass(frozen=True, eq=False, repr=False)
+class OptimalPlan(Value):
     """A solution of an optimal control problem.
 
     Attributes:
@@ -63,7 +64,7 @@ class OptimalPlan:
     parameters: Array = field(repr=False)
     quadrature: str
     integrator: str
-    seconds: float
+    seconds: float = field(compare=False)
 
     @property
     def states(self) -> dict[str, Array]:
@@ -89,14 +90,6 @@ class OptimalPlan:
     def duration(self) -> float:
         """Seconds; what was found where the duration is free."""
         return float(self.t[-1])
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, OptimalPlan):
-            return NotImplemented
-        names = [name for name in self.__dataclass_fields__ if name != "seconds"]
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
-
-    __hash__ = None  # type: ignore[assignment]
 
     def sensitivity(self, name: str) -> Array:
         """du*/dp of a parameter: (N, m, *shape of the parameter), exact where curvature is.
