@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.values import Value
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
@@ -23,6 +22,7 @@ from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.values import Value
 
 NAMESPACE = "vibrational"
 

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.values import Value
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
@@ -22,6 +21,7 @@ from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_pe
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, check_slow
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
+from lie_codegen.values import Value
 
 NAMESPACE = "euler_average"
 _MOST_NODES = 8192

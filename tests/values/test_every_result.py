@@ -36,9 +36,7 @@ def pieces() -> Any:
 
 
 def vibration() -> Any:
-    system = lc.lagrangian_system(
-        coordinates=["x"], lagrangian="x_dot^2/2 + cos(x)", forces={"x": "f"}, inputs=["f"]
-    )
+    system = lc.lagrangian_system(coordinates=["x"], lagrangian="x_dot^2/2 + cos(x)", forces={"x": "f"}, inputs=["f"])
     return lc.vibrational_average(system, lc.PeriodicInput(["cos(t)"]))
 
 
@@ -54,7 +52,7 @@ SAVED: dict[str, Callable[[], Any]] = {
     "no series": lambda: lc.PeriodicInput(["exp(sin(t))", "cos(t)", "0"], period="2*pi"),
     "pieces": pieces,
     "function": lambda: lc.PeriodicInput.from_callable(wave, "2*pi"),
-    "fourier": lambda: lc.PeriodicInput.from_fourier([[1, 0, "1/3"]], [[0, 1, 0]], mean=[0, 0, 1]),
+    "fourier": lambda: lc.PeriodicInput.from_fourier([["1", "0", "1/3"]], [[0, 1, 0]], mean=[0, 0, 1]),
     "linear": lambda: circles().linear([["1/3", 2, 0], [0, 1, 1], [1, 0, 0]]),
     "linear, no series": lambda: lc.PeriodicInput.from_callable(wave, "2*pi").linear(2 * np.eye(3)),
     "samples": lambda: lc.PeriodicInput.from_samples(np.random.default_rng(0).normal(size=(5, 3)), "2*pi"),
@@ -132,8 +130,8 @@ def test_dask_carries_a_result(name: str) -> None:
 def test_a_saved_input_drives_the_same_motion_in_a_fresh_process(tmp_path: Path) -> None:
     file = circles().save(tmp_path / "u.npz")
     code = (
-        "import lie_codegen as lc; u = lc.load({!r}); "
+        f"import lie_codegen as lc; u = lc.load({str(file)!r}); "
         "print(lc.simulate('so3', u, t=[0, 1, 2]).X[-1].tobytes().hex())"
-    ).format(str(file))
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == lc.simulate("so3", circles(), t=[0, 1, 2]).X[-1].tobytes().hex()
