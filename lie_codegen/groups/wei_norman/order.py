@@ -82,6 +82,8 @@ def wei_norman_order(group: GroupLike) -> WeiNormanOrder:
         if _score(found) < _score(domain) and (domain.walls == found.walls == () or domain.walls):
             best, domain = other, found
     combinations = None if domain.is_global else _adapted_combinations(group)
+    if combinations and domain.truncated and all(dict(row) == {label: 1} for label, row in combinations.items()):
+        combinations = None  # the given basis again: to prove it an algebra once more takes longest of all
     changed = change_of_basis(group, combinations) if combinations else None
     changed_domain = chart_domain(changed) if changed and not is_generic(changed.algebra) else None
     truncated = domain.truncated
