@@ -89,7 +89,7 @@ def test_waypoints_through_the_front_door() -> None:
         t=np.linspace(0, 10, 41), tolerance=1e-7,
     )  # fmt: skip
     np.testing.assert_allclose(run.X[-1], points[-1], atol=1e-3)
-    with pytest.raises(InputError, match="by formulas, or by times and waypoints"):
+    with pytest.raises(InputError, match="by formulas, by a plan, or by times and waypoints"):
         lc.reference(se3)
 
 
