@@ -88,7 +88,8 @@ def test_a_current_folder_is_left_alone(tmp_path: Path) -> None:
         lc.generate(law("soft", 5), home, name="soft")
 
 
-def test_a_warm_build_lowers_nothing() -> None:
+def test_a_warm_build_lowers_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LIE_CODEGEN_CACHE", str(tmp_path))  # its own: that of the whole run evicts
     lc.build(law("warm", 7))
     code = (
         "import sys, lie_codegen as lc; law = lc.attitude_law('pd', inertia=(1, 2, 2), k_p=7, k_d=6, name='warm'); "
