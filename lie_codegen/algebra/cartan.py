@@ -56,16 +56,13 @@ def cartan_involution_of(algebra: LieAlgebra) -> Involution:
     Raises:
         AlgebraError: the algebra is not semisimple, or the iteration ends at no involution.
     """
-    n = algebra.dim
     parts = structure(algebra)
     killing = parts.killing
     if not parts.semisimple:
         raise AlgebraError(
             f"{algebra.name}: a Cartan involution belongs to a semisimple algebra; the Killing form is singular"
         )
-    ads = np.zeros((n, n, n))
-    for i, j, k, value in algebra.constants():
-        ads[i, k, j] = float(value)
+    ads = algebra.ad_matrices
     K = np.array([[float(entry) for entry in row] for row in killing.tolist()])
     G = _limit(ads)
     theta = -np.linalg.solve(K, G)

@@ -79,6 +79,13 @@ class LieAlgebra:
         array.setflags(write=False)
         return array
 
+    @cached_property
+    def ad_matrices(self) -> np.ndarray:
+        """(n, n, n) the matrices of ad_{A_i} as doubles: column j of the i-th holds the coordinates of [A_i, A_j]."""
+        array = np.ascontiguousarray(np.swapaxes(self.structure_constants, 1, 2))
+        array.setflags(write=False)
+        return array
+
     def constants(self) -> Iterator[tuple[int, int, int, Number]]:
         """All nonzero (i, j, k, c[i, j, k]), both orders of i and j."""
         for (i, j), row in self.table.items():

@@ -14,23 +14,10 @@ the other factor. Along X' = X hat(u + w), w white of density Q: S' = -ad_u S - 
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import scipy.linalg
 
 from lie_codegen.arrays import Array
-from lie_codegen.groups.matrix_group import MatrixGroup
-
-
-@lru_cache(maxsize=32)
-def ad_matrices(group: MatrixGroup) -> Array:
-    """(n, n, n): the k-th is the matrix of ad_k."""
-    table = np.zeros((group.dim,) * 3)
-    for i, j, k, value in group.algebra.constants():
-        table[i, k, j] = float(value)
-    table.setflags(write=False)
-    return table
 
 
 def compounded(ads: Array, first: Array, second: Array, order: int) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from lie_codegen.errors import ComputationError, InputError, NotFiniteError, Sha
 from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
-from lie_codegen.groups.maps.covariance import ad_matrices, compounded, flowed, transported
+from lie_codegen.groups.maps.covariance import compounded, flowed, transported
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.values import Value
 
@@ -74,7 +74,7 @@ class Uncertain(Value):
             raise InputError(f"Uncertain.compound: order is 2 or 4, given {order!r}")
         back = np.linalg.inv(self._adjoint(other.X))
         first = transported(back, self.covariance)
-        total, shift = compounded(ad_matrices(self.group), first, other.covariance, order)
+        total, shift = compounded(self.group.algebra.ad_matrices, first, other.covariance, order)
         # Means of the parts add to first order; their products are of sixth order in the deviations.
         shift = shift + back @ self.mean_shift + other.mean_shift
         return Uncertain(self.group, self.X @ other.X, total, shift)
@@ -111,7 +111,7 @@ class Uncertain(Value):
             raise InputError(f"Uncertain.flow: noise does not run backwards; duration = {duration:g} is negative")
         Q = np.zeros((n, n)) if noise is None else _covariance(noise, n, "Uncertain.flow: noise")
         step = build(self.group).exp(np.ascontiguousarray(duration * velocity))
-        S = flowed(ad_matrices(self.group), velocity, float(duration), self.covariance, Q)
+        S = flowed(self.group.algebra.ad_matrices, velocity, float(duration), self.covariance, Q)
         shift = np.linalg.inv(self._adjoint(step)) @ self.mean_shift
         return Uncertain(self.group, self.X @ step, S, shift)
 

@@ -11,7 +11,6 @@ import scipy.linalg
 import sympy as sp
 from numpy.typing import NDArray
 
-from lie_codegen.algebra.adjoint import ad
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -76,7 +75,7 @@ def _numeric_domain(group: MatrixGroup) -> ChartDomain:
     """How far det M^{-1} keeps its sign along random rays; the end by the arguments that need no determinant."""
     rng = np.random.default_rng(0)
     n = group.dim
-    ads = np.array([[[float(entry) for entry in row] for row in ad(group.algebra, k).tolist()] for k in range(n)])
+    ads = group.algebra.ad_matrices
     first = np.inf
     for _ in range(_RAYS):
         ray = rng.normal(size=n)

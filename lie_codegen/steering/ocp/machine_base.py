@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ OK, HELD, INPUT = 4, 5, 6
 GAUSS_NEWTON, EXACT_LATER, EXACT_AT_ONCE = 0, 1, 2
 
 
-class Machine:
+class Machine(ABC):
     """What solves a problem, whichever way.
 
     Attributes:
@@ -37,35 +38,35 @@ class Machine:
         """A workspace of zeros, one record."""
         return np.zeros(1, self.dtype)
 
+    @abstractmethod
     def solve(
         self, space: Array, rows: Array, t0: float, tolerance: float, allowed: float, outer: int, most: int
     ) -> None:
         """Solves from what the workspace holds."""
-        raise NotImplementedError
 
+    @abstractmethod
     def gains(self, space: Array, rows: Array, t0: float) -> float:
         """One clean sweep."""
-        raise NotImplementedError
 
+    @abstractmethod
     def first_guess(self, space: Array, rows: Array, t0: float) -> None:
         """Controls that cost least at the first state."""
-        raise NotImplementedError
 
+    @abstractmethod
     def advance(self, x: Array, u: Array, p: Array, t: float, h: float, parts: int) -> Array:
         """The model's motion by h in `parts` steps, states as stored."""
-        raise NotImplementedError
 
+    @abstractmethod
     def running_cost(self, x: Array, u: Array, p: Array, t: float) -> float:
         """l."""
-        raise NotImplementedError
 
+    @abstractmethod
     def plan_cost(self, space: Array, rows: Array, t0: float) -> float:
         """The cost of the plan in a workspace."""
-        raise NotImplementedError
 
+    @abstractmethod
     def step(self, space: Array, X: Array, z: Array, rows: Array, t0: float, iterations: int, u: Array) -> int:
         """One sample."""
-        raise NotImplementedError
 
 
 def workspace_type(intervals: int, sizes: Sizes) -> np.dtype[Any]:
