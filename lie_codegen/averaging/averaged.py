@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas, moments
-from lie_codegen.averaging.floquet import floquet_magnus
 from lie_codegen.averaging.nilpotent import nilpotency_step
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.signals.floquet_magnus import floquet_magnus
 from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of

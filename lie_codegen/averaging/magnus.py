@@ -21,11 +21,11 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.floquet import bernoulli
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.signals.floquet_magnus import bernoulli
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of
 

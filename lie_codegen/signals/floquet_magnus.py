@@ -8,16 +8,18 @@ S_q^(k)[Y] = sum_m [Lambda_m, S_{q-m}^(k-1)[Y]] and S^(0)[Y] = Y,
     G_q = delta_{q1} U + 1/2 S_q^(1)[U + F] + sum_{k even} B_k / k! S_q^(k)[U - F],
     F_q = mean(G_q),   Lambda_q = int_0^t (G_q - F_q).
 
+An input that is itself a series, U = sum eps^(q-1) U_q, joins at every order: G_q starts from U_q, and U_q stands beside F_q.
+
 There are no secular terms. Truncated at F_p and Lambda_{p-1} the error is O(eps^p) on [0, b / eps]. The recursion is
 that of Casas, Oteo and Ros for exp(Lambda) exp(t F), reversed for left-invariant systems.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import factorial
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 S = TypeVar("S")
 
@@ -50,16 +52,24 @@ def bernoulli(count: int) -> list[Fraction]:
     return numbers
 
 
-def floquet_magnus(calculus: Calculus[S], u: S, order: int) -> tuple[list[S], list[S]]:
-    """([F_1 .. F_p], [Lambda_1 .. Lambda_{p-1}]) for eps = 1 time unit 1; F_q are constant signals."""
+def floquet_magnus(calculus: Calculus[S], u: S | Sequence[S], order: int) -> tuple[list[S], list[S]]:
+    """([F_1 .. F_p], [Lambda_1 .. Lambda_{p-1}]) for eps = 1 time unit 1; F_q are constant signals.
+
+    Args:
+        calculus: of the signals.
+        u: U; or a list [U_1, U_2, ...] of the terms of X' = X sum eps^q U_q, as far as they are known or wanted.
+        order: p.
+    """
     weights = [b / factorial(k) for k, b in enumerate(bernoulli(order + 1))]
+    inputs: list[S] = list(u) if isinstance(u, list) else [cast(S, u)]
     rates: list[S] = []
     logarithms: list[S] = []
     minus: dict[tuple[int, int], S] = {}
     plus: list[S] = []
     for q in range(1, order + 1):
         last = q == order
-        terms: list[tuple[Fraction | int, Any]] = [(1, u)] if q == 1 else []
+        own: list[tuple[Fraction | int, Any]] = [(1, inputs[q - 1])] if q <= len(inputs) else []
+        terms = list(own)
         for m in range(1, q):
             terms.append((Fraction(1, 2), calculus.bracket(logarithms[m - 1], plus[q - m - 1], mean_only=last)))
         for k in range(1, q):
@@ -73,8 +83,8 @@ def floquet_magnus(calculus: Calculus[S], u: S, order: int) -> tuple[list[S], li
         g = calculus.combine(terms)
         f = calculus.mean(g)
         rates.append(f)
-        minus[0, q] = calculus.combine([(1, u), (-1, f)] if q == 1 else [(-1, f)])
-        plus.append(calculus.combine([(1, u), (1, f)] if q == 1 else [(1, f)]))
+        minus[0, q] = calculus.combine([*own, (-1, f)])
+        plus.append(calculus.combine([*own, (1, f)]))
         if not last:
             logarithms.append(calculus.primitive(calculus.combine([(1, g), (-1, f)])))
     return rates, logarithms
