@@ -44,6 +44,7 @@ from .control import attitude_linearisation as attitude_linearisation
 from .control import attitude_region as attitude_region
 from .control import check_compatibility as check_compatibility
 from .control import closed_loop as closed_loop
+from .control import critical_points as critical_points
 from .control import cross_term_bound as cross_term_bound
 from .control import error_function as error_function
 from .control import error_names as error_names

@@ -9,6 +9,7 @@ from .closed_loop import ClosedLoop as ClosedLoop
 from .closed_loop import closed_loop as closed_loop
 from .closed_loop_package import generate_closed_loop as generate_closed_loop
 from .compatibility import check_compatibility as check_compatibility
+from .critical_points import critical_points as critical_points
 from .error_catalogue import error_names as error_names
 from .error_function import error_function as error_function
 from .integral_law import integral_law as integral_law

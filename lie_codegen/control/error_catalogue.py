@@ -18,7 +18,7 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
+from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols, error_function
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -71,6 +71,26 @@ def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunctio
     matched = re.fullmatch(r"(so|se)\d+_(\w+)", name)
     variant = matched[2] if matched else ""
     return _rotations(group, name, variant, gains) if variant in ("right", "left") else _motions(group, variant, gains)
+
+
+def as_error(group: MatrixGroup, error: Any, gains: Mapping[str, Any]) -> ErrorFunction:
+    """An `ErrorFunction` from what `tracking_law` accepts.
+
+    Raises:
+        InputError: none of these, or a pair of another group.
+    """
+    if isinstance(error, ErrorFunction):
+        if error.group != group:
+            raise InputError(f"the error function {error.name} is one of {error.group.name}, not of {group.name}")
+        return error
+    if isinstance(error, str):
+        return catalogue_error(group, error, gains)
+    if isinstance(error, tuple | list) and len(error) == 2:
+        parameters = {key: value for key, value in gains.items() if key.replace("_", "").lower() != "kd"}
+        return error_function(group, error[0], error[1], parameters=parameters)
+    raise InputError(
+        f"error must be one of {', '.join(error_names(group))}, an ErrorFunction or (phi, transport), got {error!r}"
+    )
 
 
 def gain(gains: Gains, name: str, where: str) -> Any:

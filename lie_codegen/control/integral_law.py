@@ -15,9 +15,9 @@ from typing import Any
 
 import sympy as sp
 
-from lie_codegen.control.error_catalogue import gain
+from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_derivatives import ErrorDerivatives
-from lie_codegen.control.tracking_law import as_error, tracking_law
+from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.control.attitude import gains_for_response
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.error_catalogue import gain
-from lie_codegen.control.tracking_law import as_error
+from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group

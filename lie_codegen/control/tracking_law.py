@@ -21,10 +21,11 @@ from typing import Any
 
 import sympy as sp
 
+from lie_codegen.control.claims import check_claims
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.error_catalogue import catalogue_error, error_names, gain
+from lie_codegen.control.error_catalogue import as_error, error_names, gain
 from lie_codegen.control.error_derivatives import ErrorDerivatives
-from lie_codegen.control.error_function import ErrorFunction, error_function
+from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -81,7 +82,8 @@ def tracking_law(
         name: C identifier of the kernel.
 
     Raises:
-        InputError: an indefinite inertia or gain, a name that is not known, a gain that is missing.
+        InputError: an indefinite inertia or gain, a name that is not known, a gain that is missing; phi is negative somewhere; its
+            `constant` is not valid.
         IncompatibleError: phi and the transport map do not satisfy (A2); with the residual.
     """
     group = as_group(group, "tracking_law")
@@ -107,6 +109,7 @@ def tracking_law(
         ),
     )
     check_compatibility(pair)
+    check_claims(pair)
     real, data = RealMatrices(group), WeiNormanData(group)
 
     def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any, *given: Any) -> tuple[Any, ...]:
@@ -145,26 +148,6 @@ def tracking_law(
         sampler=sampler,
     )
     return nan_off_group(law, group, ("X", "X_d"))
-
-
-def as_error(group: MatrixGroup, error: Any, gains: Mapping[str, Any]) -> ErrorFunction:
-    """An `ErrorFunction` from what `tracking_law` accepts.
-
-    Raises:
-        InputError: none of these, or a pair of another group.
-    """
-    if isinstance(error, ErrorFunction):
-        if error.group != group:
-            raise InputError(f"the error function {error.name} is one of {error.group.name}, not of {group.name}")
-        return error
-    if isinstance(error, str):
-        return catalogue_error(group, error, gains)
-    if isinstance(error, tuple | list) and len(error) == 2:
-        parameters = {key: value for key, value in gains.items() if key.replace("_", "").lower() != "kd"}
-        return error_function(group, error[0], error[1], parameters=parameters)
-    raise InputError(
-        f"error must be one of {', '.join(error_names(group))}, an ErrorFunction or (phi, transport), got {error!r}"
-    )
 
 
 def _inertia(group: MatrixGroup, inertia: Any) -> sp.ImmutableMatrix:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.control.claims import check_constant, is_claimed
+from lie_codegen.control.error_catalogue import as_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction
-from lie_codegen.control.tracking_law import as_error
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -56,7 +57,7 @@ def tracking_region(
     rate falls with the distance from the origin (phi/|d phi|^2 grows as |p|^2).
 
     Raises:
-        InputError: as `tracking_law`.
+        InputError: as `tracking_law`; phi is negative somewhere; a constant that was claimed is not valid.
     """
     group = as_group(group, "tracking_region")
     pair = as_error(group, error, gains)
@@ -101,15 +102,22 @@ def attitude_constants(K_p: Any, inertia: Any, epsilon: float) -> QuadraticConst
 
 
 def _region(pair: ErrorFunction, W: float) -> TrackingRegion:
+    """W against the constant L, which for a pair of the user's is a claim that its critical points must bear out."""
     if pair.constant is None:
-        return TrackingRegion(
-            W, None, None, f"no region is known for the error function {pair.name}: give its constant L"
-        )
-    inside = pair.constant > W
-    words = f"W = {W:.6g} is below L = {pair.constant:.6g}: convergence is proved"
+        words = f"no region is known for the error function {pair.name}: lc.certificate looks for its constant L"
+        return TrackingRegion(W, None, None, words)
+    bound, how = pair.constant, "convergence is proved"
+    if is_claimed(pair):
+        found = check_constant(pair)
+        if found.status not in ("complete", "degenerate"):
+            words = f"L = {bound:.6g} of {pair.name} lies below all critical points found ({found.status}): nothing is proved"
+            return TrackingRegion(W, bound, None, words)
+        how = f"convergence follows, as L lies below the critical points of phi ({found.status})"
+    inside = bound > W
+    words = f"W = {W:.6g} is below L = {bound:.6g}: {how}"
     if not inside:
-        words = f"W = {W:.6g} is not below L = {pair.constant:.6g}: outside the proved region, nothing is claimed"
-    return TrackingRegion(W, pair.constant, inside, words)
+        words = f"W = {W:.6g} is not below L = {bound:.6g}: outside the proved region, nothing is claimed"
+    return TrackingRegion(W, bound, inside, words)
 
 
 def _entries(group: MatrixGroup, X: ArrayLike) -> list[list[Any]]:
