@@ -10,35 +10,10 @@
  * ROWS (all basis matrices vanish below), SKEW (they are skew-Hermitian), COORDINATES (brackets from structure
  * constants, else as matrices), QUATERNION; and hat(), lie_bracket(), quaternion_matrix().
  */
-#include "magnus_lanes.h"
-
-#include "magnus_group.h"
-
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT
-#endif
-
-#define MATRIX (PARTS * ROWS * SIZE)
-#define FULL (PARTS * SIZE * SIZE)
-#if COORDINATES
-#define WORK DIM
-#else
-#define WORK MATRIX
-#endif
-#if QUATERNION
-#define STATE 4
-#else
-#define STATE MATRIX
-#endif
-
-#include "magnus_input.h"
-#include "magnus_exponent.h"
-#include "magnus_move.h"
+#include "magnus_words.h"
 
 /* One step of every lane; keeps the largest squared |a_1|. */
-static __attribute__((noinline)) void step(const Input *u, const Source *source, int order, V middle, V low, V h, const double *const *table,
+static __attribute__((noinline)) void step(const Input *u, Source *source, int order, V middle, V low, V h, const double *const *table,
     V *state, V *most)
 {
     V a[ORDERS][DIM], omega[WORK], norm = splat(0.0);
@@ -72,53 +47,11 @@ static inline V middle_of(V knot, V inside, V h, V *low)
     return sum;
 }
 
-static void lay_out(const Input *u, V *space, Source *source)
-{
-    source->cosines = space;
-    source->sines = source->cosines + u->rates * DIM;
-    source->rate = source->sines + u->rates * DIM;
-    source->rate_low = source->rate + u->rates;
-    source->weights = source->rate_low + u->rates;
-    source->left = source->weights + u->rates * ORDERS;
-    source->slope = source->left + DIM;
-    source->series = source->slope + DIM;
-    EACH(l, LANES) { source->h[l] = -1.0; }
-    source->start = splat(0.0);
-    source->width = splat(1.0);
-    source->factor = splat(1.0);
-    EACH(i, DIM) { source->left[i] = source->slope[i] = splat(0.0); }
-    for (ptrdiff_t k = 0; k < u->rates * ORDERS; ++k) {
-        source->weights[k] = splat(0.0);
-    }
-    for (ptrdiff_t k = 0; k < u->terms * DIM; ++k) {
-        source->series[k] = splat(0.0);
-    }
-}
-
-static void set_waves(const Input *u, Source *source, int lane, ptrdiff_t who)
-{
-    for (ptrdiff_t k = 0; k < u->rates * DIM; ++k) {
-        source->cosines[k][lane] = u->cosines[who * u->wave_stride + k];
-        source->sines[k][lane] = u->sines[who * u->wave_stride + k];
-    }
-    for (ptrdiff_t f = 0; f < u->rates; ++f) {
-        source->rate[f][lane] = u->rate[who * u->rate_stride + f];
-        source->rate_low[f][lane] = u->rate_low[who * u->rate_stride + f];
-    }
-    source->h[lane] = -1.0;
-    source->factor[lane] = u->factor[who * u->factor_stride];
-}
-
 /* Doubles that the workspace needs, with 8 more for its alignment. */
 EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots);
 EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots)
 {
-    return LANES * (rates * (2 * DIM + 2 + ORDERS) + (terms + 2) * DIM + 1) + slots * (STATE + 1);
-}
-
-static V *aligned(double *space)
-{
-    return (V *)(((size_t)space + sizeof(V) - 1) / sizeof(V) * sizeof(V));
+    return LANES * (rates * (2 * DIM + 6 + ORDERS) + (terms + 2) * DIM + 1) + slots * (STATE + 1);
 }
 
 /*
@@ -273,97 +206,4 @@ EXPORT double magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptr
     return sqrt(largest(most));
 }
 
-/* Doubles of the workspace of magnus_tangents, with 8 more for its alignment. */
-EXPORT ptrdiff_t magnus_tangents_work(ptrdiff_t tangents);
-EXPORT ptrdiff_t magnus_tangents_work(ptrdiff_t tangents)
-{
-    return LANES * (WORK * tangents + 2 * DIM + 1);
-}
-
-/*
- * X at the end of equal steps over one span, from the identity, and dX: (tangents, SIZE, SIZE), its exact derivatives along
- * the tangents of the table: the derivative of what is computed, not an approximation of another. Order 8, lanes over time.
- */
-EXPORT void magnus_tangents(const Input *u, double length, ptrdiff_t steps, double *space, double *X, double *dX);
-EXPORT void magnus_tangents(const Input *u, double length, ptrdiff_t steps, double *space, double *X, double *dX)
-{
-    V *work = aligned(space), *eta = work + 2 * DIM, state[STATE];
-    Source source;
-    Input plain = *u;
-    const V h = splat(length / (double)steps);
-    ptrdiff_t first[LANES + 1], longest = 0;
-    double before[FULL], after[FULL];
-    plain.rates = plain.terms = 0;
-    lay_out(&plain, work, &source);
-    identity(state);
-    for (ptrdiff_t k = 0; k < WORK * u->tangents; ++k) {
-        eta[k] = splat(0.0);
-    }
-    for (int l = 0; l <= LANES; ++l) {
-        first[l] = steps / LANES * l + (steps % LANES) * l / LANES;
-        longest = l && first[l] - first[l - 1] > longest ? first[l] - first[l - 1] : longest;
-    }
-    for (ptrdiff_t k = 0; k < longest; ++k) {
-        const double *table[LANES], *tangent[LANES];
-        V a[ORDERS][DIM], da[ORDERS][DIM], omega[WORK], domega[WORK], length_now = h;
-        Stages stages;
-        EACH(l, LANES) {
-            const ptrdiff_t at = first[l] + k < first[l + 1] ? first[l] + k : 0;
-            length_now[l] = first[l] + k < first[l + 1] ? h[l] : 0.0; /* a lane that is done waits */
-            table[l] = u->table + at * u->nodes * DIM;
-            tangent[l] = u->tangent + at * u->nodes * u->tangents * DIM;
-        }
-        generators(&plain, &source, splat(0.0), splat(0.0), length_now, table, a);
-#if !COORDINATES
-        V wa[ORDERS][MATRIX], wda[ORDERS][MATRIX];
-        EACH(j, ORDERS) { hat(a[j], wa[j]); }
-#else
-#define wa a
-#define wda da
-#endif
-        exponent8((const V (*)[WORK])wa, &stages, omega);
-        for (ptrdiff_t p = 0; p < u->tangents; ++p) {
-            EACH(j, ORDERS) {
-                EACH(i, DIM) { da[j][i] = splat(0.0); }
-            }
-            from_nodes(u, tangent, u->tangents * DIM, length_now, da);
-#if !COORDINATES
-            EACH(j, ORDERS) { hat(da[j], wda[j]); }
-#endif
-            tangent8((const V (*)[WORK])wa, (const V (*)[WORK])wda, &stages, domega);
-            carry(omega, domega, eta + p * WORK);
-            EACH(l, LANES) { tangent[l] += DIM; }
-        }
-        move(omega, state);
-    }
-    /* d(P X) = dP X + P X hat(eta), lane by lane. */
-    memset(dX, 0, (size_t)(u->tangents * PARTS * SIZE * SIZE) * sizeof(double));
-    memset(before, 0, sizeof before);
-    EACH(i, SIZE) { before[i * SIZE + i] = 1.0; }
-    EACH(l, LANES) {
-        double one[STATE], matrix[FULL];
-        EACH(k, STATE) { one[k] = state[k][l]; }
-        to_matrix(one, matrix);
-        multiply_one(before, matrix, after);
-        for (ptrdiff_t p = 0; p < u->tangents; ++p) {
-            double *to = dX + p * PARTS * SIZE * SIZE, old[FULL], moved[FULL], generator[FULL], more[FULL];
-            V A[MATRIX];
-#if COORDINATES
-            hat(eta + p * WORK, A);
-#else
-            EACH(k, MATRIX) { A[k] = eta[p * WORK + k]; }
-#endif
-            memset(generator, 0, sizeof generator);
-            EACH(q, PARTS) {
-                EACH(i, ROWS * SIZE) { generator[q * SIZE * SIZE + i] = A[q * ROWS * SIZE + i][l]; }
-            }
-            get(to, old);
-            multiply_one(old, matrix, moved);
-            multiply_one(after, generator, more);
-            EACH(k, FULL) { moved[k] += more[k]; }
-            put(moved, to);
-        }
-        memcpy(before, after, sizeof before);
-    }
-    put(before, X);
-}
+#include "magnus_solve.h"

@@ -33,10 +33,12 @@ typedef struct {
     V *cosines, *sines; /* rates x DIM */
     V *rate, *rate_low;
     V *weights;         /* rates x ORDERS: k_1 .. k_4 of w h */
+    V *angle, *turn;    /* rates x 2: cos and sin of w t at the last middle; cos - 1 and sin of w h */
+    ptrdiff_t age;      /* steps since the angles were taken afresh; negative: they have to be */
     V *left, *slope;    /* DIM each */
     V *series;          /* terms x DIM */
     V start, width, factor;
-    double h[LANES];    /* of the weights */
+    double h[LANES], turned[LANES]; /* of the weights, of `turn` */
 } Source;
 
 /* cos and sin of p + e, e small: p less the nearest multiple of pi/2, in three pieces, then Taylor to 1e-18. */
@@ -86,20 +88,38 @@ static void wave_weights(double angle, double *k)
 static void set_weights(const Input *u, Source *source, int lane, double h)
 {
     if (fabs(source->h[lane] - h) <= 1e-13 * h) { /* of equal spans, rounded */
+        for (ptrdiff_t f = 0; f < u->rates; ++f) { /* the angle is turned many times, so it has the rest too */
+            const double rest = source->rate[f][lane] * (h - source->turned[lane]), less = source->turn[2 * f][lane];
+            source->turn[2 * f][lane] -= rest * source->turn[2 * f + 1][lane];
+            source->turn[2 * f + 1][lane] += rest * (1.0 + less);
+        }
+        source->turned[lane] = h;
         return;
     }
+    source->h[lane] = source->turned[lane] = h;
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
-        double k[ORDERS];
-        wave_weights(source->rate[f][lane] * h, k);
+        const double rate = source->rate[f][lane];
+        double k[ORDERS], turn[2];
+        /* Lanes mostly share their rates and steps; sines cost more than a step. */
+        if (lane && source->h[lane - 1] == h && source->turned[lane - 1] == h && source->rate[f][lane - 1] == rate) {
+            EACH(i, ORDERS) { k[i] = source->weights[f * ORDERS + i][lane - 1]; }
+            EACH(i, 2) { turn[i] = source->turn[2 * f + i][lane - 1]; }
+        } else {
+            const double half = sin(0.5 * rate * h);
+            wave_weights(rate * h, k);
+            turn[0] = -2.0 * half * half;
+            turn[1] = sin(rate * h);
+        }
         EACH(i, ORDERS) { source->weights[f * ORDERS + i][lane] = k[i]; }
+        EACH(i, 2) { source->turn[2 * f + i][lane] = turn[i]; }
     }
-    source->h[lane] = h;
 }
 
 /* A lane enters a span. */
 static void enter(const Input *u, const Grid *grid, Source *source, int lane, ptrdiff_t span, double h, ptrdiff_t who)
 {
     set_weights(u, source, lane, h);
+    source->age = -1;
     if (u->times) {
         const ptrdiff_t k = grid->piece[span];
         const double width = u->times[k + 1] - u->times[k];
@@ -171,17 +191,27 @@ static __attribute__((noinline)) void from_series(const Input *u, const Source *
 }
 
 /* a_1 .. a_4 of eight steps whose middles are middle + low. */
-static inline void generators(const Input *u, const Source *source, V middle, V low, V h, const double *const *table,
+static inline void generators(const Input *u, Source *source, V middle, V low, V h, const double *const *table,
     V a[ORDERS][DIM])
 {
     EACH(j, ORDERS) {
         EACH(i, DIM) { a[j][i] = splat(0.0); }
     }
+    /* Angles turn by w h from step to step; what rounding adds is thrown away every 64 steps. */
+    source->age = source->age >= 0 && source->age < 64 ? source->age + 1 : 0;
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
-        const V rate = source->rate[f], angle = rate * middle, *k = source->weights + f * ORDERS;
-        const V rest = fused(rate, middle, -angle) + (source->rate_low[f] * middle + rate * low);
-        V c, s;
-        cos_sin(angle, rest, &c, &s);
+        const V *k = source->weights + f * ORDERS;
+        V c = source->angle[2 * f], s = source->angle[2 * f + 1];
+        if (source->age) {
+            const V less = source->turn[2 * f], sine = source->turn[2 * f + 1], before = c;
+            c += c * less - s * sine;
+            s += s * less + before * sine;
+        } else {
+            const V rate = source->rate[f], angle = rate * middle;
+            cos_sin(angle, fused(rate, middle, -angle) + (source->rate_low[f] * middle + rate * low), &c, &s);
+        }
+        source->angle[2 * f] = c;
+        source->angle[2 * f + 1] = s;
         EACH(i, DIM) {
             const V x = source->cosines[f * DIM + i], y = source->sines[f * DIM + i];
             const V p = h * (x * c + y * s), q = h * (y * c - x * s);

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("O3")
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 

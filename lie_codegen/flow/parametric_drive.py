@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive, resolved_drive
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.parametric_input import ParametricInput, Waves
@@ -45,13 +46,23 @@ def parametric_batch(
     return [parametric_drive(u, [float(x) for x in row], length, rtol, resolution, where) for row in rows]
 
 
+def wave_numbers(waves: Waves, values: Sequence[float]) -> Array:
+    """Rates, cosines, sines, one after the other; not finite where a formula has no value there."""
+    try:
+        return np.array(waves.evaluate_one(*values), dtype=float)
+    except (ValueError, ZeroDivisionError, OverflowError, TypeError):
+        # `math` raises where numpy gives NaN or infinity, which the flow refuses by name.
+        with np.errstate(all="ignore"):
+            return np.array(waves.evaluate(*(np.float64(value) for value in values)), dtype=float)
+
+
 def _of_waves(waves: Waves, n: int, values: Sequence[Any], count: int | None) -> Drive:
     F = waves.count
-    entries = waves.evaluate(*values)
     shape = () if count is None else (count,)
     if count is None:
-        flat = np.array(entries, dtype=float)
+        flat = wave_numbers(waves, values)
     else:
+        entries = waves.evaluate(*values)
         flat = np.stack([np.broadcast_to(np.asarray(each, dtype=float), shape) for each in entries], axis=-1)
     rates = np.ascontiguousarray(flat[..., :F])
     cosines, sines = (

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.inputs import as_drive, as_signal
 from lie_codegen.flow.magnus.drive import Drive
-from lie_codegen.flow.magnus.run import MagnusRun, magnus_run, order_for
+from lie_codegen.flow.magnus.run import BLOCK, MOST_STEPS, MagnusRun, as_run, magnus_run, order_for, solver_of
+from lie_codegen.flow.magnus.solver import LONG, REACHED, WaveRuns
 from lie_codegen.flow.magnus.tangents import tangents
-from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive
+from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive, wave_numbers
 from lie_codegen.flow.simulate import check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -145,6 +146,15 @@ class Propagator:
             values = self.u.values(parameters)
             length = self.u.period_of(values)[0] if self.duration == "period" else float(self.duration)
             named = dict(zip(self.u.parameters, values, strict=True))
+            if self._wave_runs is not None and self.u.waves is not None:
+                numbers = wave_numbers(self.u.waves, values)
+                found = self._wave_runs(
+                    numbers, length, order=self._order, rtol=self.rtol, most=MOST_STEPS, block=BLOCK
+                )
+                if found.status != REACHED and not np.all(np.isfinite(numbers)):
+                    raise NotFiniteError(f"{where}: a formula of the input is NaN or infinite at {named}")
+                if found.status != LONG:
+                    return self._propagation(as_run(found, self._order, 0.0, where, MOST_STEPS), length, named)
             drive = parametric_drive(self.u, values, length, self.rtol, self.resolution, where)
         else:
             if parameters:
@@ -159,7 +169,9 @@ class Propagator:
                 rtol=self.rtol,
                 resolution=self.resolution,
             )
-        run = self._run(drive, length, self._one)
+        return self._propagation(self._run(drive, length, self._one), length, named)
+
+    def _propagation(self, run: MagnusRun, length: float, named: dict[str, float]) -> Propagation:
         finest = max(run.steps, int(np.ceil(length / run.shortest * (1 - 1e-9))))
         return Propagation(run.X[0], run.error_estimate, run.steps, length, named, self, finest)
 
@@ -222,12 +234,22 @@ class Propagator:
     def _one(self) -> Array:
         return np.eye(self.group.degree, dtype=complex if self.group.is_complex else float)
 
+    @cached_property
+    def _order(self) -> int:
+        return order_for("auto", self.rtol)
+
+    @cached_property
+    def _wave_runs(self) -> WaveRuns | None:
+        """Calls that allocate nothing, where u is a sum of waves and there is a compiler."""
+        waves, solver = (None if self.u.breakpoints else self.u.waves), solver_of(self.group)
+        return None if waves is None or solver is None else WaveRuns(solver, self.group, waves.count)
+
     def _fixed_length(self) -> float:
         return float(self.u.T) if self.duration == "period" else float(self.duration)
 
     def _run(self, drive: Drive, length: float, start: Array, threads: int = 1) -> MagnusRun:
-        times, order = np.array([0.0, length]), order_for("auto", self.rtol)
-        return magnus_run(self.group, drive, times, start, order=order, rtol=self.rtol, threads=threads)
+        times = np.array([0.0, length])
+        return magnus_run(self.group, drive, times, start, order=self._order, rtol=self.rtol, threads=threads)
 
 
 def propagator(

@@ -16,7 +16,8 @@ from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.inputs import drive_signal
 from lie_codegen.flow.libraries import step_of
 from lie_codegen.flow.magnus.drive import Drive
-from lie_codegen.flow.magnus.run import MOST_STEPS, flow, gram_of, magnus_run
+from lie_codegen.flow.magnus.run import MOST_STEPS, flow, magnus_run
+from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.flow.refined import refined
 from lie_codegen.flow.restarts import Chart, restarted_charts

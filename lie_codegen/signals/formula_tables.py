@@ -46,14 +46,16 @@ class PieceTable:
     right: Array
 
 
-def periodic_formula(waveform: Waveform, n: int, period: float, start: float, end: float) -> FormulaInput | None:
-    """n periodic components on [start, end] as a loop evaluates them; None where they are no such formula."""
+def series_formula(waveform: Waveform, n: int) -> FormulaInput | None:
+    """n components as a Fourier series that a loop evaluates, at all times; None where they are none."""
     series = fourier_table(waveform, n)
-    if series is not None:
-        return fourier_input(series.rates, series.cosines, series.sines, rates_low=series.rates_low)
-    pieces = piece_table(waveform, n)
-    if pieces is None:
+    if series is None:
         return None
+    return fourier_input(series.rates, series.cosines, series.sines, rates_low=series.rates_low)
+
+
+def lines_between(pieces: PieceTable, period: float, start: float, end: float) -> FormulaInput:
+    """Straight pieces, repeated over [start, end]."""
     first, last = int(np.floor(start / period)), max(int(np.ceil(end / period)), int(np.floor(start / period)) + 1)
     whole = np.arange(first, last)
     times = np.append((whole[:, None] * period + pieces.starts).ravel(), last * period)

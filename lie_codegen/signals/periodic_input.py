@@ -15,7 +15,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput
-from lie_codegen.signals.formula_tables import periodic_formula
+from lie_codegen.signals.formula_tables import PieceTable, lines_between, piece_table, series_formula
 from lie_codegen.signals.input_formulas import (
     TIME,
     coefficients_of,
@@ -97,7 +97,17 @@ class PeriodicInput(Saved):
 
     def as_formula(self, start: float, end: float) -> FormulaInput | None:
         """u on [start, end] as a compiled loop evaluates it; None where it is neither a Fourier series nor straight pieces."""
-        return periodic_formula(self.waveform, self.dim, self.T, start, end)
+        if self._series is not None:
+            return self._series
+        return None if self._pieces is None else lines_between(self._pieces, self.T, start, end)
+
+    @cached_property
+    def _series(self) -> FormulaInput | None:
+        return series_formula(self.waveform, self.dim)
+
+    @cached_property
+    def _pieces(self) -> PieceTable | None:
+        return piece_table(self.waveform, self.dim)
 
     @staticmethod
     def from_fourier(
@@ -218,7 +228,7 @@ class PeriodicInput(Saved):
         """Whether its averages are exact: sums of sines and cosines, or pieces of polynomials with them."""
         return self.waveform.exact
 
-    @property
+    @cached_property
     def T(self) -> float:
         """The period as a double."""
         return float(self.period)

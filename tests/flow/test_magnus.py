@@ -10,7 +10,8 @@ from scipy.linalg import expm
 import lie_codegen as lc
 from lie_codegen.errors import ComputationError, ExpressionError, InputError, NotFiniteError
 from lie_codegen.flow.magnus import numpy_steps
-from lie_codegen.flow.magnus.run import flow, gram_of
+from lie_codegen.flow.magnus.run import flow
+from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.runtime.formula_input import fourier_input
 

@@ -9,7 +9,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.flow.events import INNER, Event, EventHits, Function, find_events
 from lie_codegen.flow.magnus import numpy_steps
 from lie_codegen.flow.magnus.drive import Drive
-from lie_codegen.flow.magnus.run import MOST_STEPS, flow, gram_of
+from lie_codegen.flow.magnus.run import MOST_STEPS, flow
+from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 

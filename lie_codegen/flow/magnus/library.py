@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -18,11 +17,13 @@ from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
 
 #: Plain C, beside the header that is made for the group.
-_FILES = ("magnus.c", "magnus_lanes.h", "magnus_input.h", "magnus_exponent.h", "magnus_move.h")
+_HEADERS = tuple(f"magnus_{name}.h" for name in ("words", "lanes", "input", "exponent", "move", "space"))
 _LANES = 8
+#: Up to this dimension loops over coordinates are worth unrolling (a third faster); beyond, it only takes longer to compile.
+_SMALL = 8
 
 
-class _Input(ctypes.Structure):
+class Input(ctypes.Structure):
     _fields_ = [
         (name, ctypes.c_void_p if kind == "p" else ctypes.c_ssize_t)
         for name, kind in (
@@ -40,32 +41,55 @@ class _Grid(ctypes.Structure):
     ]
 
 
+class Solve(ctypes.Structure):
+    _fields_ = [
+        ("u", Input), ("pieces", ctypes.c_ssize_t), *((n, ctypes.c_void_p) for n in ("gram", "times", "X0")),
+        *((n, ctypes.c_ssize_t) for n in ("count", "order", "most", "block")), ("rtol", ctypes.c_double), ("atol", ctypes.c_double),
+        *((n, ctypes.c_void_p) for n in ("knots", "parts", "first", "piece", "slot", "space", "coarse", "fine", "end")),
+        *((n, ctypes.c_ssize_t) for n in ("spans", "multiple", "steps")),
+        *((n, ctypes.c_double) for n in ("estimate", "longest", "shortest")),
+    ]  # fmt: skip
+
+
 class MagnusLibrary:
-    """magnus.c of one group, loaded."""
+    """magnus.c of one group, loaded; the derivatives are a library of their own, opened when they are asked for."""
 
     def __init__(self, group: MatrixGroup, library: ctypes.CDLL) -> None:
-        size = ctypes.c_ssize_t
+        size, pointer = ctypes.c_ssize_t, ctypes.c_void_p
         self.group = group
         self._work = library.magnus_work
         self._work.restype, self._work.argtypes = size, (size, size, size)
-        self._one, self._many = library.magnus_one, library.magnus_many
-        self._tangents, self._tangents_work = library.magnus_tangents, library.magnus_tangents_work
-        pointer = ctypes.c_void_p
+        self._one, self._many, self.solve = library.magnus_one, library.magnus_many, library.magnus_solve
         self._one.restype = self._many.restype = ctypes.c_double
-        self._tangents.restype, self._tangents_work.restype = None, size
-        self._tangents_work.argtypes = (size,)
-        self._tangents.argtypes = (pointer, ctypes.c_double, size, pointer, pointer, pointer)
         self._one.argtypes = (pointer, pointer, size, size, size, pointer, size, pointer, pointer, pointer)
         self._many.argtypes = (pointer, pointer, size, size, pointer, size, size, pointer, pointer)
+        self.solve.restype, self.solve.argtypes = size, (pointer,)
+
+    def work(self, rates: int, terms: int, slots: int) -> int:
+        """Doubles of the workspace of one trajectory, with its alignment."""
+        return int(self._work(rates, terms, slots)) + _LANES
+
+    @cached_property
+    def _derivatives(self) -> ctypes.CDLL:
+        size, pointer = ctypes.c_ssize_t, ctypes.c_void_p
+        library = _opened(self.group, "magnus_tangents")
+        if library is None:
+            raise CompileError(
+                f"{self.group.name}: the derivatives of its Magnus steps do not compile, though the steps do"
+            )
+        library.magnus_tangents_work.restype, library.magnus_tangents_work.argtypes = size, (size,)
+        library.magnus_tangents.restype = None
+        library.magnus_tangents.argtypes = (pointer, ctypes.c_double, size, pointer, pointer, pointer)
+        return library
 
     def one(self, drive: Drive, steps: Steps, order: int, X0: Array, first: int, last: int) -> tuple[Array, Array]:
         """One trajectory over steps first .. last - 1 from X0: X where a span ends whose slot is not negative, and at the end.
 
         Slots whose span does not end within these steps are left as they are: zero.
         """
-        u, grid, _kept = self._arguments(drive, steps, 0)
+        u, grid = read_by(drive, 0), grid_of(steps)
         X, end = np.zeros((steps.slots, *X0.shape), X0.dtype), np.empty_like(X0)
-        space = np.empty(self._work(drive.rates.shape[-1], drive.terms, steps.slots) + _LANES)
+        space = np.empty(self.work(drive.rates.shape[-1], drive.terms, steps.slots))
         self._one(
             ctypes.addressof(u), ctypes.addressof(grid), order, first, last, X0.ctypes.data, steps.slots,
             space.ctypes.data, X.ctypes.data, end.ctypes.data,
@@ -74,10 +98,10 @@ class MagnusLibrary:
 
     def many(self, drive: Drive, steps: Steps, order: int, X0: Array, first: int, last: int) -> Array:
         """Trajectories first .. last - 1 over all steps: (last - first, slots, d, d). X0: (d, d), or (N, d, d)."""
-        u, grid, _kept = self._arguments(drive, steps, first)
+        u, grid = read_by(drive, first), grid_of(steps)
         stride = X0[0].size * (2 if X0.dtype.kind == "c" else 1) if X0.ndim == 3 else 0
         X = np.zeros((last - first, steps.slots, *X0.shape[-2:]), X0.dtype)
-        space = np.empty(self._work(drive.rates.shape[-1], drive.terms, 0) + _LANES)
+        space = np.empty(self.work(drive.rates.shape[-1], drive.terms, 0))
         self._many(
             ctypes.addressof(u), ctypes.addressof(grid), order, last - first, X0.ctypes.data + 8 * stride * first, stride,
             steps.slots, space.ctypes.data, X.ctypes.data,
@@ -96,57 +120,72 @@ class MagnusLibrary:
         count, nodes, m, _ = tangents.shape
         d, kind = self.group.degree, complex if self.group.is_complex else float
         factor = np.ones(1)
-        u = _Input(
+        u = Input(
             nodes=nodes, table=values.ctypes.data, projection=projection.ctypes.data, tangents=m,
             tangent=tangents.ctypes.data, factor=factor.ctypes.data,
         )  # fmt: skip
         X, dX = np.empty((d, d), kind), np.empty((m, d, d), kind)
-        space = np.empty(self._tangents_work(m) + _LANES)
-        self._tangents(ctypes.addressof(u), length, count, space.ctypes.data, X.ctypes.data, dX.ctypes.data)
+        space = np.empty(self._derivatives.magnus_tangents_work(m) + _LANES)
+        self._derivatives.magnus_tangents(
+            ctypes.addressof(u), length, count, space.ctypes.data, X.ctypes.data, dX.ctypes.data
+        )
         return X, dX
 
-    def _arguments(self, drive: Drive, steps: Steps, who: int) -> tuple[_Input, _Grid, tuple[Any, ...]]:
-        formula = drive.formula
 
-        def table(values: Array) -> tuple[int, int]:
-            stride = values[0].size if values.ndim == 3 else 0
-            return values.ctypes.data + 8 * who * stride, stride
+def read_by(drive: Drive, who: int) -> Input:
+    """The drive of trajectory `who` as the C reads it; the drive's arrays have to stay."""
+    formula = drive.formula
 
-        (cosines, waves), (sines, _) = table(formula.cosines), table(formula.sines)
-        (left, lines), (right, _) = table(formula.left), table(formula.right)
-        rate_stride = drive.rates.shape[-1] if drive.rates.ndim == 2 else 0
-        factor_stride = int(len(drive.factor) > 1)
-        times = drive.times
-        u = _Input(
-            rates=drive.rates.shape[-1], wave_stride=waves, rate=drive.rates.ctypes.data + 8 * who * rate_stride,
-            rate_low=drive.rates_low.ctypes.data + 8 * who * rate_stride,
-            rate_stride=rate_stride, cosines=cosines, sines=sines,
-            times=times.ctypes.data if len(times) else None, left=left, right=right, line_stride=lines,
-            terms=drive.terms, series=drive.series.ctypes.data, factor=drive.factor.ctypes.data + 8 * who * factor_stride,
-            factor_stride=factor_stride,
-        )  # fmt: skip
-        grid = _Grid(
-            len(steps.parts), steps.knots.ctypes.data, steps.parts.ctypes.data, steps.first.ctypes.data,
-            steps.piece.ctypes.data, steps.slot.ctypes.data,
-        )  # fmt: skip
-        return u, grid, (drive, steps)
+    def table(values: Array) -> tuple[int, int]:
+        stride = values[0].size if values.ndim == 3 else 0
+        return values.ctypes.data + 8 * who * stride, stride
+
+    (cosines, waves), (sines, _) = table(formula.cosines), table(formula.sines)
+    (left, lines), (right, _) = table(formula.left), table(formula.right)
+    rate_stride = drive.rates.shape[-1] if drive.rates.ndim == 2 else 0
+    factor_stride = int(len(drive.factor) > 1)
+    times = drive.times
+    return Input(
+        rates=drive.rates.shape[-1], wave_stride=waves, rate=drive.rates.ctypes.data + 8 * who * rate_stride,
+        rate_low=drive.rates_low.ctypes.data + 8 * who * rate_stride,
+        rate_stride=rate_stride, cosines=cosines, sines=sines,
+        times=times.ctypes.data if len(times) else None, left=left, right=right, line_stride=lines,
+        terms=drive.terms, series=drive.series.ctypes.data, factor=drive.factor.ctypes.data + 8 * who * factor_stride,
+        factor_stride=factor_stride,
+    )  # fmt: skip
+
+
+def grid_of(steps: Steps) -> _Grid:
+    """The steps as the C reads them."""
+    return _Grid(
+        len(steps.parts), steps.knots.ctypes.data, steps.parts.ctypes.data, steps.first.ctypes.data,
+        steps.piece.ctypes.data, steps.slot.ctypes.data,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=32)
 def magnus_library(group: MatrixGroup) -> MagnusLibrary | None:
     """The compiled steps of a group; None where there is no compiler."""
+    library = _opened(group, "magnus")
+    return None if library is None else MagnusLibrary(group, library)
+
+
+def _opened(group: MatrixGroup, stem: str) -> ctypes.CDLL | None:
+    """A C file with the headers of the Magnus steps and the one made for the group, compiled."""
 
     def files() -> dict[str, str]:
         from lie_codegen.codegen.templates import render
         from lie_codegen.flow.magnus.group_view import group_view
 
-        plain = {name: (template_folder() / name).read_text(encoding="utf-8") for name in _FILES}
+        names = (f"{stem}.c", *_HEADERS, *(("magnus_solve.h",) if stem == "magnus" else ()))
+        plain = {name: (template_folder() / name).read_text(encoding="utf-8") for name in names}
         return {**plain, "magnus_group.h": render("magnus_group.h.jinja", group=group_view(group))}
 
     try:
         path = build_source(
-            files, "magnus.c", namespace=f"{group.name}_magnus", definition=f"magnus\n{group.definition_text}"
-        )
+            files, f"{stem}.c", namespace=f"{group.name}_{stem}", definition=f"{stem}\n{group.definition_text}",
+            more_flags=("-O3",) if group.dim <= _SMALL else (),
+        )  # fmt: skip
     except CompileError:
         return None
-    return None if path is None else MagnusLibrary(group, load_library(path))
+    return None if path is None else load_library(path)

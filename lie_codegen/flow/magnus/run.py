@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from lie_codegen.errors import ComputationError
 from lie_codegen.flow.magnus import numpy_steps
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.library import MagnusLibrary, magnus_library
+from lie_codegen.flow.magnus.solver import LONG, REACHED, TOO_MANY, TOO_MANY_AT_FIRST, Solved, Solver, gram_of
 from lie_codegen.flow.magnus.steps import Steps, plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.threads import share_out
@@ -19,11 +21,19 @@ from lie_codegen.runtime.threads import share_out
 ORDERS = {"magnus4": 4, "magnus6": 6, "magnus8": 8}
 MOST_STEPS = 2**26
 #: Steps in one call of the compiled loop, about a tenth of a second.
-_BLOCK = 2_000_000
+BLOCK = 2_000_000
 #: Steps of one trajectory, and trajectories, below which another thread costs more than it brings.
 _LEAST_STEPS, _LEAST_TRAJECTORIES = 4096, 32
 #: The steps are never made more than so many times shorter at once: far from convergence the estimate says little.
 _LARGEST_LEAP = 8
+_TOO_FAST = (
+    "{where}: |h u| and the fastest sine ask for more than the {most} steps that are taken; shorten t, or scale u"
+)
+_NOT_REACHED = (
+    "{where}: {done} steps do not reach the tolerance, and those needed are more than the {most} that are taken; loosen rtol, "
+    "shorten t, or name the times at which u is not smooth in an attribute `breakpoints` of u"
+)
+_OUT_OF_RANGE = "{where}: the solution left the range of double precision"
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,20 +82,53 @@ def magnus_run(
         ComputationError: the tolerance is not met with `most` steps, or the solution is not finite.
     """
     where = f"simulate({group.name})"
+    solver = solver_of(group) if threads == 1 and X0.ndim == 2 and drive.many is None else None
+    if solver is None:
+        return _led_by_python(group, drive, times, X0, order, rtol, atol, most, threads, where)
+    found = solver(drive, times, X0, order=order, rtol=rtol, atol=atol, most=most, block=BLOCK)
+    if found.status == LONG:
+        return _led_by_python(group, drive, times, X0, order, rtol, atol, most, threads, where)
+    return as_run(found, order, drive.error, where, most)
+
+
+def as_run(found: Solved, order: int, left_out: float, where: str, most: int) -> MagnusRun:
+    """What compiled code found, or the reason why it found nothing.
+
+    Raises:
+        ComputationError: see `magnus_run`.
+    """
+    if found.status == TOO_MANY_AT_FIRST:
+        raise ComputationError(_TOO_FAST.format(where=where, most=most))
+    if found.status == TOO_MANY:
+        raise ComputationError(_NOT_REACHED.format(where=where, most=most, done=found.steps))
+    if found.status != REACHED:
+        raise ComputationError(_OUT_OF_RANGE.format(where=where))
+    scale = max(1.0, float(np.max(np.abs(found.X)))) if left_out else 1.0
+    estimate = found.estimate + left_out * scale
+    return MagnusRun(found.X, order, found.multiple, found.steps, found.longest, found.shortest, estimate)
+
+
+def _led_by_python(
+    group: MatrixGroup,
+    drive: Drive,
+    times: Array,
+    X0: Array,
+    order: int,
+    rtol: float,
+    atol: float,
+    most: int,
+    threads: int,
+    where: str,
+) -> MagnusRun:
+    """The same loop as magnus_solve.h: for many trajectories, several threads, runs of millions of steps, and without a compiler."""
     base = plan_steps(drive, gram_of(group), times, most)
     if base is None:
-        raise ComputationError(
-            f"{where}: |h u| and the fastest sine ask for more than the {most} steps that are taken; shorten t, or scale u"
-        )
+        raise ComputationError(_TOO_FAST.format(where=where, most=most))
     before, coarse = 1, _finite(flow(group, drive, base, order, X0, threads), where)
     multiple, trust = 2, order - 2
     while True:
         if base.count * multiple > most:
-            raise ComputationError(
-                f"{where}: {base.count * before} steps do not reach the tolerance, and {base.count * multiple} are more than "
-                f"the {most} that are taken; loosen rtol, shorten t, or name the times at which u is not smooth in an "
-                "attribute `breakpoints` of u"
-            )
+            raise ComputationError(_NOT_REACHED.format(where=where, most=most, done=base.count * before))
         steps = base.times(multiple)
         fine = _finite(flow(group, drive, steps, order, X0, threads), where)
         scale = max(1.0, float(np.max(np.abs(fine))))
@@ -117,10 +160,11 @@ def fixed_run(
     return MagnusRun(X, order, 1, chosen.count, chosen.longest, chosen.shortest, float("nan"))
 
 
-def gram_of(group: MatrixGroup) -> Array:
-    """x' G x = |hat(x)|^2, Frobenius."""
-    flat = np.asarray(group.basis).reshape(group.dim, -1)
-    return np.ascontiguousarray((flat @ np.conj(flat.T)).real)
+@lru_cache(maxsize=32)
+def solver_of(group: MatrixGroup) -> Solver | None:
+    """Runs of the group by compiled code; None where there is no compiler."""
+    library = magnus_library(group)
+    return None if library is None else Solver(library, gram_of(group))
 
 
 def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, threads: int = 1) -> Array:
@@ -139,11 +183,11 @@ def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, 
 
 def _in_blocks(library: MagnusLibrary, drive: Drive, steps: Steps, order: int, X0: Array) -> Array:
     """One thread, block after block of steps: in between Python looks whether somebody pressed Ctrl-C."""
-    if steps.count <= _BLOCK:
+    if steps.count <= BLOCK:
         return library.one(drive, steps, order, X0, 0, steps.count)[0]
     found, before = np.zeros((steps.slots, *X0.shape), X0.dtype), X0
-    for first in range(0, steps.count, _BLOCK):
-        last = min(first + _BLOCK, steps.count)
+    for first in range(0, steps.count, BLOCK):
+        last = min(first + BLOCK, steps.count)
         X, before = library.one(drive, steps, order, before, first, last)
         ends_here = (steps.first[1:] > first) & (steps.first[1:] <= last) & (steps.slot >= 0)
         found[steps.slot[ends_here]] = X[steps.slot[ends_here]]
@@ -167,5 +211,5 @@ def _over_time(library: MagnusLibrary, drive: Drive, steps: Steps, order: int, X
 
 def _finite(X: Array, where: str) -> Array:
     if not np.all(np.isfinite(X)):
-        raise ComputationError(f"{where}: the solution left the range of double precision")
+        raise ComputationError(_OUT_OF_RANGE.format(where=where))
     return X

@@ -1,0 +1,53 @@
+/* What the lanes know of u, laid out in the workspace. */
+#ifndef MAGNUS_SPACE_H
+#define MAGNUS_SPACE_H
+
+static V *aligned(double *space)
+{
+    return (V *)(((size_t)space + sizeof(V) - 1) / sizeof(V) * sizeof(V));
+}
+
+static void lay_out(const Input *u, V *space, Source *source)
+{
+    source->cosines = space;
+    source->sines = source->cosines + u->rates * DIM;
+    source->rate = source->sines + u->rates * DIM;
+    source->rate_low = source->rate + u->rates;
+    source->weights = source->rate_low + u->rates;
+    source->angle = source->weights + u->rates * ORDERS;
+    source->turn = source->angle + u->rates * 2;
+    source->left = source->turn + u->rates * 2;
+    source->age = -1;
+    source->slope = source->left + DIM;
+    source->series = source->slope + DIM;
+    EACH(l, LANES) { source->h[l] = -1.0; }
+    source->start = splat(0.0);
+    source->width = splat(1.0);
+    source->factor = splat(1.0);
+    EACH(i, DIM) { source->left[i] = source->slope[i] = splat(0.0); }
+    for (ptrdiff_t k = 0; k < u->rates * ORDERS; ++k) {
+        source->weights[k] = splat(0.0);
+    }
+    for (ptrdiff_t k = 0; k < u->rates * 4; ++k) {
+        source->angle[k] = splat(0.0);
+    }
+    for (ptrdiff_t k = 0; k < u->terms * DIM; ++k) {
+        source->series[k] = splat(0.0);
+    }
+}
+
+static void set_waves(const Input *u, Source *source, int lane, ptrdiff_t who)
+{
+    for (ptrdiff_t k = 0; k < u->rates * DIM; ++k) {
+        source->cosines[k][lane] = u->cosines[who * u->wave_stride + k];
+        source->sines[k][lane] = u->sines[who * u->wave_stride + k];
+    }
+    for (ptrdiff_t f = 0; f < u->rates; ++f) {
+        source->rate[f][lane] = u->rate[who * u->rate_stride + f];
+        source->rate_low[f][lane] = u->rate_low[who * u->rate_stride + f];
+    }
+    source->h[lane] = -1.0;
+    source->factor[lane] = u->factor[who * u->factor_stride];
+}
+
+#endif

@@ -1,0 +1,33 @@
+/* The sizes that follow from magnus_group.h, and the parts that every file of the Magnus steps needs. */
+#ifndef MAGNUS_WORDS_H
+#define MAGNUS_WORDS_H
+
+#include "magnus_lanes.h"
+
+#include "magnus_group.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT
+#endif
+
+#define MATRIX (PARTS * ROWS * SIZE)
+#define FULL (PARTS * SIZE * SIZE)
+#if COORDINATES
+#define WORK DIM
+#else
+#define WORK MATRIX
+#endif
+#if QUATERNION
+#define STATE 4
+#else
+#define STATE MATRIX
+#endif
+
+#include "magnus_input.h"
+#include "magnus_exponent.h"
+#include "magnus_move.h"
+#include "magnus_space.h"
+
+#endif
