@@ -80,11 +80,14 @@ from .groups import from_brackets as from_brackets
 from .groups import from_matrices as from_matrices
 from .groups import fuse as fuse
 from .groups import generate as generate
+from .groups import gradient as gradient
 from .groups import group as group
 from .groups import group_kernels as group_kernels
 from .groups import group_names as group_names
+from .groups import hessian as hessian
 from .groups import interpolate as interpolate
 from .groups import jacobian as jacobian
+from .groups import jax_function as jax_function
 from .groups import mean as mean
 from .groups import nearest as nearest
 from .groups import pauli as pauli
@@ -96,6 +99,8 @@ from .groups import semidirect as semidirect
 from .groups import structure as structure
 from .groups import tangent_from as tangent_from
 from .groups import tangent_to as tangent_to
+from .groups import torch_function as torch_function
+from .groups import transition_step as transition_step
 from .groups import wei_norman as wei_norman
 from .groups import wei_norman_order as wei_norman_order
 from .groups import wei_norman_step as wei_norman_step

@@ -1,5 +1,7 @@
 """Matrix Lie groups: definition, catalogue, structure, maps and Wei-Norman charts."""
 
+from .autodiff.jax_function import jax_function as jax_function
+from .autodiff.torch_function import torch_function as torch_function
 from .build import build as build
 from .build import generate as generate
 from .cartan import cartan_involution as cartan_involution
@@ -29,7 +31,10 @@ from .matrix_group import MatrixGroup as MatrixGroup
 from .pauli import pauli as pauli
 from .products import product as product
 from .products import semidirect as semidirect
+from .second_derivative import gradient as gradient
+from .second_derivative import hessian as hessian
 from .structure import structure as structure
+from .transition_step import transition_step as transition_step
 from .wei_norman.chart_domain import chart_domain as chart_domain
 from .wei_norman.matrix import wei_norman as wei_norman
 from .wei_norman.order import wei_norman_order as wei_norman_order

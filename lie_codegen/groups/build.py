@@ -67,6 +67,7 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name
             )
             require_kernels(whole, () if kernels == "all" else kernels)
             whole.made_by(_build_kernels, given, name)
+            whole.compiled_from(lambda asked: next(each for each in given if asked in (each.name, each.symbol)))
             return whole
         library = group_library(object_definition(group), lambda: group)
         library.made_by(build, group)

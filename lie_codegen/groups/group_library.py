@@ -162,7 +162,9 @@ def group_library(definition: str, load: Callable[[], MatrixGroup]) -> GroupLibr
     compilers = find_compilers()
     if not compilers:
         warn_no_compiler()
-        return GroupLibrary(*origin.names(), lambda name: interpreted([origin.kernel(name)]), None)
+        library = GroupLibrary(*origin.names(), lambda name: interpreted([origin.kernel(name)]), None)
+        library.compiled_from(origin.kernel)
+        return library
     folder = usable_folder()
     prepare_extension()
     namespace, kernels = _known_names(folder, origin)
@@ -172,7 +174,9 @@ def group_library(definition: str, load: Callable[[], MatrixGroup]) -> GroupLibr
             lambda: origin.sources(name), compilers, definition=f"{definition}\nkernel {name}", namespace=namespace
         )
 
-    return GroupLibrary(namespace, kernels, make, folder / "entries")
+    library = GroupLibrary(namespace, kernels, make, folder / "entries")
+    library.compiled_from(origin.kernel)
+    return library
 
 
 def _known_names(folder: Path, origin: GroupSources) -> tuple[str, tuple[str, ...]]:

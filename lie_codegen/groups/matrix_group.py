@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,12 @@ from lie_codegen.algebra.constructions import permutation, reorder_algebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
+from lie_codegen.kernel.casadi_functions import CasadiFunctions
 from lie_codegen.kernel.definition import Definition, definition_of
+from lie_codegen.kernel.kernel import Kernel
+
+#: Where the kernels of a group are made, above this file: named here and loaded when `group.casadi` is asked.
+KERNELS, STEP = "lie_codegen.groups.kernels", "lie_codegen.groups.maps.rkmk"
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,18 @@ class MatrixGroup:
         matrix = np.asarray(A, dtype=complex)
         flat = matrix.reshape(*matrix.shape[:-2], -1)
         return np.concatenate([flat.real, flat.imag], axis=-1) @ self.coordinate_rows.T
+
+    @cached_property
+    def casadi(self) -> CasadiFunctions:
+        """exp, log, Ad, ljac and the others as `casadi.Function`s for the user's own NLP, as `group.casadi.exp(x)`."""
+        kernels = import_module(KERNELS)
+
+        def make(name: str) -> Kernel:
+            step = name == "rkmk4_step"
+            made: Kernel = import_module(STEP).rkmk4_step(self) if step else kernels.group_kernel(self, name)
+            return made
+
+        return CasadiFunctions(self.name, (*kernels.KERNEL_NAMES, "rkmk4_step"), make)
 
     def reorder(self, labels: Sequence[str]) -> MatrixGroup:
         """The same group with its basis in another order.

@@ -19,6 +19,8 @@ from lie_codegen.runtime.threads import in_parts
 if TYPE_CHECKING:
     import inspect
 
+    from lie_codegen.kernel.kernel import Kernel
+
 
 #: What a call gives: an array, a number, or a named tuple.
 Result = TypeVar("Result")
@@ -249,6 +251,18 @@ class Compiled(Generic[Result]):
     def belongs_to(self, library: Any) -> None:
         """The library of which it is a kernel: it pickles as that kernel of that library."""
         self._library = library
+
+    @property
+    def kernel(self) -> Kernel:
+        """The Kernel that it was compiled from.
+
+        Raises:
+            InputError: it belongs to no library made by lc.build.
+        """
+        if self._library is None:
+            raise InputError(f"the function {self.name} belongs to no library made by lc.build; give the Kernel")
+        made: Kernel = self._library.kernel_of(self.name)
+        return made
 
     def reduced(self) -> tuple[Any, ...]:
         """How it is made again, for pickle."""

@@ -11,6 +11,7 @@ from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CodegenError, InputError
 
 if TYPE_CHECKING:
+    from lie_codegen.kernel.kernel import Kernel
     from lie_codegen.runtime.call import Compiled
 
 
@@ -45,6 +46,7 @@ class Library:
         self._notes = tuple(build_log)
         self._lanes = lanes
         self._recipe: tuple[Any, ...] = ()
+        self._kernel: Callable[[str], Kernel] | None = None
         self.__dict__.update({function.name: function for function in functions})
 
     def made_by(self, make: Callable[..., Any], *arguments: Any) -> None:
@@ -54,6 +56,22 @@ class Library:
         for function in self.__dict__.values():
             if hasattr(function, "belongs_to"):
                 function.belongs_to(self)
+
+    def compiled_from(self, kernel: Callable[[str], Kernel]) -> None:
+        """Where the Kernel of a name is found, for what is derived from compiled functions."""
+        self._kernel = kernel
+
+    def kernel_of(self, name: str) -> Kernel:
+        """The Kernel that a compiled function was made from.
+
+        Raises:
+            InputError: the library was not made by lc.build.
+        """
+        if self._kernel is None:
+            raise InputError(
+                f"the library {self.namespace} was not made by lc.build and knows no kernels; give the Kernel"
+            )
+        return self._kernel(name)
 
     def __reduce__(self) -> tuple[Any, ...]:
         if not self._recipe:

@@ -40,6 +40,8 @@ ALLOWED = {
     "numpy": set(LAYERS),
     "lazy_loader": {None, *LAYERS},
     "ziglang": {"runtime"},
+    "jax": {"groups"},
+    "torch": {"groups"},
 }  # fmt: skip
 
 
