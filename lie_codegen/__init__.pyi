@@ -8,6 +8,7 @@ __version__: str
 from . import averaging as averaging
 from . import control as control
 from . import errors as errors
+from . import exact as exact
 from . import flow as flow
 from . import groups as groups
 from . import kernel as kernel
@@ -56,6 +57,9 @@ from .control import reference as reference
 from .control import rigid_gains as rigid_gains
 from .control import tracking_law as tracking_law
 from .control import tracking_region as tracking_region
+
+# exact
+from .exact import Budget as Budget
 
 # flow
 from .flow import Event as Event

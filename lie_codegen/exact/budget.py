@@ -14,7 +14,7 @@ from lie_codegen.errors import InputError
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of the grammar and of group files; raise one with `with Budget(digits=2000): ...`.
+    """Limits of the grammar, of group files and of exact results; raise one with `with lc.Budget(digits=2000): ...`.
 
     Attributes:
         digits: decimal digits of numerator and denominator of a number; the default keeps numbers within a double.
@@ -23,6 +23,7 @@ class Budget:
         dimension: labels of a group, and rows of a matrix.
         size: bytes of a group file.
         nesting: brackets within brackets in a formula, parts of a dotted key.
+        products: products of two terms that one exact result may take; in a number field of degree d each counts d^2.
 
     Raises:
         InputError: a limit that is not a positive integer.
@@ -34,6 +35,7 @@ class Budget:
     dimension: int = 128
     size: int = 1_000_000
     nesting: int = 60
+    products: int = 500_000
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -67,8 +69,31 @@ def over(limit: str, what: str) -> str:
     value = getattr(current_budget(), limit)
     return (
         f"{what}; the limit of {limit} is {value}; from Python it is raised by "
-        f"`with lie_codegen.exact.budget.Budget({limit}=...):` around the call"
+        f"`with lie_codegen.Budget({limit}=...):` around the call"
     )
+
+
+@dataclass
+class Meter:
+    """Counts the products of terms that one exact result takes.
+
+    Attributes:
+        what: the result, for the message.
+        spent: products so far.
+    """
+
+    what: str
+    spent: int = 0
+
+    def spend(self, products: int) -> None:
+        """Count products that are about to be made.
+
+        Raises:
+            InputError: with them the result is over the budget.
+        """
+        self.spent += products
+        if self.spent > _current.get().products:
+            raise InputError(over("products", f"{self.what} takes too many products of terms"))
 
 
 def complaint(value: sp.Expr) -> str | None:

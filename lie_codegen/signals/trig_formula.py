@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from lie_codegen.errors import PeriodError
+from lie_codegen.exact.budget import Meter
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.trig_signal import TrigSignal
@@ -172,6 +173,7 @@ class Reader:
     position: dict[sp.Expr, int]
     denominators: dict[sp.Expr, int]
     omega: sp.Expr
+    meter: Meter = field(default_factory=lambda: Meter("an input's Fourier form"))
 
     def read(self, node: sp.Expr) -> tuple[trig.Wave, int]:
         """(wave, denominator) of a formula."""
@@ -203,6 +205,7 @@ class Reader:
 
     def _product(self, x: tuple[trig.Wave, int], y: tuple[trig.Wave, int]) -> tuple[trig.Wave, int]:
         total: trig.Wave = {}
+        self.meter.spend(trig.products(x[0], y[0]))
         trig.add_twice_product(total, x[0], y[0], 1, self.ring.multiply)
         return trig.clean(total), 2 * x[1] * y[1]
 

@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from lie_codegen.algebra.lie_algebra import Sparse
+from lie_codegen.exact.budget import Meter
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import Coefficient, CoefficientRing
 
@@ -58,6 +59,11 @@ class TrigCalculus:
         common = math.lcm(1, *(d for row in rows.values() for _, _, d in row))
         return {pair: [(k, c * (common // d)) for k, c, d in row] for pair, row in rows.items()}, common
 
+    @cached_property
+    def meter(self) -> Meter:
+        """What has been spent on products so far."""
+        return Meter("the average to this order")
+
     def bracket(self, x: TrigSignal, y: TrigSignal, *, mean_only: bool = False) -> TrigSignal:
         """[x, y], or its mean over a period (for signals without powers of tau)."""
         multiply = self.ring.multiply
@@ -69,6 +75,7 @@ class TrigCalculus:
             for a, b, sign in ((i, j, 1), (j, i, -1)):
                 for p, u in x.components.get(a, {}).items():
                     for q, v in y.components.get(b, {}).items():
+                        self.meter.spend(trig.products(u, v))
                         product(wedge.setdefault(p + q, {}), u, v, sign, multiply)
             for k, c in rows:
                 for p, wave in wedge.items():

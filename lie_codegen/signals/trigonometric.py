@@ -60,6 +60,15 @@ def clean(wave: Wave) -> Wave:
     return {key: entry for key, entry in wave.items() if entry[0] or entry[1]}
 
 
+def products(x: Wave, y: Wave) -> int:
+    """How many products of terms x y takes."""
+    return _terms(x) * _terms(y)
+
+
+def _terms(wave: Wave) -> int:
+    return sum(1 if isinstance(part, int) else len(part) for entry in wave.values() for part in entry if part)
+
+
 def add_scaled(target: Wave, wave: Wave, factor: Coefficient, multiply: Multiply) -> None:
     """target += factor wave."""
     for key, (cosine, sine) in wave.items():

@@ -12,8 +12,9 @@ import pytest
 import sympy as sp
 
 import lie_codegen as lc
+from lie_codegen import Budget
 from lie_codegen.errors import InputError
-from lie_codegen.exact.budget import Budget, current_budget, field_degree
+from lie_codegen.exact.budget import current_budget, field_degree
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, parse_number
 from lie_codegen.exact.numbers import exact_number, field_elements
 
@@ -113,3 +114,32 @@ def test_inputs_and_periods_beyond_a_double(call: Callable[[], object]) -> None:
 def test_durations_the_arithmetic_cannot_carry(duration: Any) -> None:
     with pytest.raises(InputError, match="duration must be"):
         lc.steer("so3", [0.1, 0.2, 0.3], controls=["w1", "w2"], duration=duration)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    ["(((sin(t)+1)^60+cos(t))^60+sin(3*t))^60", "((1+sin(t))^64*(1+cos(3*t))^64*(2+sin(5*t))^64)^64"],
+)
+def test_an_input_of_too_many_products(formula: str) -> None:
+    with pytest.raises(InputError, match=r"limit of products is 500000; .*lie_codegen.Budget\(products"):
+        lc.PeriodicInput([formula])
+
+
+def test_an_average_of_too_many_products() -> None:
+    u = lc.PeriodicInput(["cos(t)+sin(2*t)", "sin(t)+cos(3*t)", "cos(t)"])
+    with lc.Budget(products=1000), pytest.raises(InputError, match=r"the average to this order .* limit of products"):
+        lc.average("so3", u, 6)
+    assert lc.average("so3", u, 6).order == 6
+
+
+def test_an_exact_matrix_of_too_many_products() -> None:
+    """so(3) in a basis of integers: its M has entries over Q(sqrt 17 + sqrt 22)."""
+    rows = {"a": {"w1": 1, "w2": 2}, "b": {"w2": 1, "w3": -3}, "c": {"w1": 2, "w3": 1}}
+    group = lc.change_of_basis("so3", rows)
+    with lc.Budget(products=50):
+        with pytest.raises(InputError, match="limit of products is 50"):
+            _ = lc.wei_norman(group).M
+        domain = lc.chart_domain(group)
+    assert domain.truncated
+    assert domain.text.startswith("numeric, not proved")
+    assert not lc.chart_domain(group).truncated

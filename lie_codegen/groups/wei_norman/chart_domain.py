@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.chart_end import End, chart_end, escaping_input
@@ -57,7 +58,10 @@ def chart_domain(group: GroupLike) -> ChartDomain:
     if is_generic(group.algebra):
         return _numeric_domain(group)
     wn = wei_norman(group)
-    _, factors = wn.determinant_factors
+    try:
+        _, factors = wn.determinant_factors
+    except InputError:  # over the budget of exact results, or of the degree of the field
+        return _numeric_domain(group)
     walls = tuple(factor for factor, _ in factors if not _positive(factor))
     end, reason = chart_end(group, bool(walls))
     witness = escaping_input(group) if end == "escape" else None

@@ -16,6 +16,7 @@ import sympy as sp
 from sympy.polys.rings import PolyElement, ring
 
 from lie_codegen.errors import ComputationError
+from lie_codegen.exact.budget import Meter
 from lie_codegen.exact.exponential import MatrixExponential
 from lie_codegen.exact.numbers import Number, exact_number, field_elements
 
@@ -55,10 +56,22 @@ class TrigonometricRing:
         self.domain, elements = field_elements(ordered)
         self._known = dict(zip(ordered, elements, strict=True))
         self.ring, *generators = ring([sp.Dummy() for _ in shown], self.domain)
+        self._count_products()
         self.generators: list[PolyElement] = generators
         self.coordinates = tuple(generators[: len(self.symbols)])
         self._sines = tuple(position + 1 for position in self.cosine.values())
         self.pairs = tuple((position, position + 1) for position in self._growth.values())
+
+    def _count_products(self) -> None:
+        """Hold every product of two terms against the budget: SymPy makes all of them, those inside a division too, by this."""
+        meter, multiply = Meter("the exact Wei-Norman matrix in this basis"), self.ring.monomial_mul
+        cost = self.domain.mod.degree() ** 2 if self.domain.is_Algebraic else 1
+
+        def counted(left: tuple[int, ...], right: tuple[int, ...]) -> Any:
+            meter.spend(cost)
+            return multiply(left, right)
+
+        self.ring.monomial_mul = counted
 
     def constant(self, value: Any) -> Element:
         """An exact number."""
