@@ -18,8 +18,8 @@ from lie_codegen.kernel.saved import Saved
 INNER = np.array([0.3090169943749474, 0.7071067811865476])
 
 
-@dataclass(frozen=True)
-class Event:
+@dataclass(frozen=True, eq=False, repr=False)
+class Event(Saved):
     """A formula g in t, X[i][j] and, along mechanical motions, xi[i] (counted from 0), that is to vanish.
 
     Of complex matrices it reads re(X[i][j]), im(X[i][j]) and abs(X[i][j]). The text is data, never evaluated.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.flow.input_slopes import dual_basis, slopes_along
 from lie_codegen.flow.inputs import as_drive, as_signal
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.run import BLOCK, MOST_STEPS, MagnusRun, as_run, magnus_run, order_for, solver_of
@@ -20,13 +21,15 @@ from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive
 from lie_codegen.flow.simulate import check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.parametric_input import ParametricInput
+from lie_codegen.signals.sampled_input import SampledInput
 
 _LARGEST_POWER = 10**12
 
 
-@dataclass(frozen=True, eq=False)
-class Propagation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Propagation(Saved):
     """X(T; p) at one p.
 
     Attributes:
@@ -35,9 +38,12 @@ class Propagation:
         steps: number of steps.
         duration: T.
         parameters: name -> value.
+        of: the propagator that it is of.
+        finest: as many steps as short as the shortest of the run.
         dX: (m, d, d) dX/dp in the order of the parameters: the exact derivative of what the steps compute, so that Newton's
-            method on it converges to rounding.
-        eta: (m, n) X^-1 dX/dp in the algebra.
+            method on it converges to rounding. Of a SampledInput (m, n, d, d), in the order of its values. Few parameters go
+            forward with the steps; where there are more than two for each dimension, n reverse passes give all of them.
+        eta: (m, n) X^-1 dX/dp in the algebra; (m, n, n) of samples.
     """
 
     X: Array
@@ -45,40 +51,74 @@ class Propagation:
     steps: int
     duration: float
     parameters: dict[str, float]
-    _of: Propagator = field(repr=False)
-    _finest: int = field(repr=False)
+    of: Propagator = field(repr=False)
+    finest: int = field(repr=False)
 
     def __repr__(self) -> str:
         at = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
         return (
-            f"Propagation({self._of.group.name}, duration={self.duration:.6g}{', ' if at else ''}{at}, {self.steps} steps, "
+            f"Propagation({self.of.group.name}, duration={self.duration:.6g}{', ' if at else ''}{at}, {self.steps} steps, "
             f"error_estimate={self.error_estimate:.2g})"
         )
 
     @cached_property
     def dX(self) -> Array:
-        """(m, d, d); see the class."""
-        u, group = self._of.u, self._of.group
-        if not isinstance(u, ParametricInput):
+        """(m, d, d), or (m, n, d, d); see the class."""
+        u, group = self.of.u, self.of.group
+        if not isinstance(u, ParametricInput | SampledInput):
             return np.zeros((0, *self.X.shape), self.X.dtype)
-        found = tangents(group, u, self.parameters, self.duration, self._finest)
-        if self._of.duration == "period":  # dX/dT = X hat(u(T))
-            slopes = u.period_of(tuple(self.parameters.values()))[1]
-            found = found + slopes[:, None, None] * (self.X @ group.hat(u(self.duration, **self.parameters)))
-        return found
+        if isinstance(u, SampledInput) or len(u.parameters) > 2 * group.dim:
+            eta = slopes_along(group, u, self.parameters, self.duration, self.finest, dual_basis(group))
+            found = np.asarray(self.X @ group.hat(np.moveaxis(eta, 0, -1)))
+        else:
+            found = tangents(group, u, self.parameters, self.duration, self.finest)
+        return found + self._of_the_end
 
     @cached_property
     def eta(self) -> Array:
-        """(m, n); see the class."""
-        return np.asarray(self._of.group.project(np.linalg.solve(self.X, self.dX)))
+        """(m, n), or (m, n, n); see the class."""
+        return np.asarray(self.of.group.project(np.linalg.solve(self.X, self.dX)))
+
+    def gradient(self, cotangent: ArrayLike) -> Array:
+        """d/dp of Re tr(G^H X), the sum of entries of G and X: (m,), or as the values of a SampledInput; one reverse pass.
+
+        The cost is that of a few runs, however many parameters or samples there are.
+
+        Args:
+            cotangent: (d, d) G, the derivative of a goal by the entries of X. For |tr(V^H X)|^2 it is 2 tr(V^H X) V.
+
+        Raises:
+            ShapeError, NotFiniteError: G is no finite (d, d) matrix.
+            InputError: the input has neither parameters nor samples.
+        """
+        u, group = self.of.u, self.of.group
+        where = f"propagator({group.name}).gradient"
+        if not isinstance(u, ParametricInput | SampledInput):
+            raise InputError(f"{where}: the input has no parameters; give a lc.ParametricInput or a lc.SampledInput")
+        G = np.asarray(cotangent)
+        if G.shape != self.X.shape or G.dtype.kind not in "biufc":
+            raise ShapeError(f"{where}: the cotangent has shape {G.shape}; give {self.X.shape} numbers")
+        if not np.all(np.isfinite(G)):
+            raise NotFiniteError(f"{where}: the cotangent holds NaN or infinity")
+        [found] = slopes_along(group, u, self.parameters, self.duration, self.finest, (self.X.conj().T @ G)[None])
+        return np.asarray(found + np.einsum("ij,...ij->...", np.conj(G), self._of_the_end).real)
+
+    @property
+    def _of_the_end(self) -> Array:
+        """X hat(u(T)) dT/dp where T is a period that depends on the parameters."""
+        u = self.of.u
+        if self.of.duration != "period" or not isinstance(u, ParametricInput):
+            return np.zeros(())[..., None, None]
+        slopes = u.period_of(tuple(self.parameters.values()))[1]
+        return np.asarray(slopes[:, None, None] * (self.X @ self.of.group.hat(u(self.duration, **self.parameters))))
 
     def power(self, n: int) -> Power:
         """X(n T) = X(T)^n of a periodic input; see `Propagator.power`."""
-        return self._of._power(self, n)
+        return self.of._power(self, n)
 
 
-@dataclass(frozen=True, eq=False)
-class Power:
+@dataclass(frozen=True, eq=False, repr=False)
+class Power(Saved):
     """X(T)^n.
 
     Attributes:
@@ -95,8 +135,8 @@ class Power:
         return f"Power(n={self.n}, error_estimate={self.error_estimate:.2g})"
 
 
-@dataclass(frozen=True, eq=False)
-class PropagationBatch:
+@dataclass(frozen=True, eq=False, repr=False)
+class PropagationBatch(Saved):
     """X(T; p) at N values of p.
 
     Attributes:
@@ -113,13 +153,13 @@ class PropagationBatch:
         return f"PropagationBatch({len(self.X)} members, {self.steps} steps, error_estimate={self.error_estimate:.2g})"
 
 
-@dataclass(frozen=True, eq=False)
-class Propagator:
+@dataclass(frozen=True, eq=False, repr=False)
+class Propagator(Saved):
     """U(a=.5, ...).X; see `propagator`.
 
     Attributes:
         group: the group.
-        u: the input.
+        u: the input; one that is a function of the user compares by what it is, and is not saved.
         duration: T, or "period".
         rtol: the tolerance.
         resolution: of a u that is no sum of sines and cosines, as in `simulate`.
@@ -132,8 +172,13 @@ class Propagator:
     resolution: float | None = None
 
     def __repr__(self) -> str:
-        names = ", ".join(getattr(self.u, "parameters", ()))
+        names = ", ".join(self.parameters)
         return f"Propagator({self.group.name}, duration={self.duration!r}, parameters=({names}), rtol={self.rtol:g})"
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of every derivative."""
+        return tuple(getattr(self.u, "parameters", ()))
 
     def __call__(self, **parameters: float) -> Propagation:
         """X(T; p).

@@ -45,6 +45,11 @@ def loop() -> Any:
     return lc.closed_loop("so3", inertia=(1, 2, 3), law=law, t=[0, 0.5, 1], xi0=[0.1, 0.2, 0.3])
 
 
+def propagator() -> Any:
+    u = lc.ParametricInput(["a*cos(t)", "0", "1"], parameters=["a"], period="2*pi")
+    return lc.propagator("so3", u, duration="period")
+
+
 SAVED: dict[str, Callable[[], Any]] = {
     "formulas": circles,
     "parameters": lambda: lc.PeriodicInput(["a*sin(t)", "cos(t)", "0"], parameters=["a"]),
@@ -58,6 +63,13 @@ SAVED: dict[str, Callable[[], Any]] = {
     "samples": lambda: lc.PeriodicInput.from_samples(np.random.default_rng(0).normal(size=(5, 3)), "2*pi"),
     "sampled": sampled,
     "run": lambda: lc.simulate("so3", circles(), t=[0, 1, 2]),
+    "events": lambda: lc.simulate("so3", [1.0, 0, 0], t=[0, 2], events=[lc.Event("X[2][2] - 3/10")]).events[0],
+    "event": lambda: lc.Event("X[2][2] - 3/10", direction=1),
+    "propagator": propagator,
+    "propagation": lambda: propagator()(a=0.7),
+    "propagations": lambda: propagator().batch(a=[0.7, 0.8]),
+    "propagation of samples": lambda: lc.propagator("so3", sampled(), duration=2.0)(),
+    "power": lambda: propagator().power(5, a=0.7),
     "run of a function": lambda: lc.simulate("so3", lambda t: np.array([np.sin(t), 0, 1]), t=[0, 1, 2]),
     "average": lambda: lc.average(lc.group("so3"), circles(), 3),
     "order": lambda: lc.order_check(lc.group("so3"), circles(), 2, eps=(0.2, 0.1)),

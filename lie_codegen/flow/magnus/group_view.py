@@ -36,6 +36,7 @@ class GroupView:
     pairs: tuple[tuple[int, int], ...]
     brackets: tuple[tuple[Bracket, ...], ...]
     matrix: tuple[tuple[Product, ...], ...]
+    back: tuple[tuple[Term, ...], ...] = ()
 
 
 def group_view(group: MatrixGroup) -> GroupView:
@@ -55,6 +56,16 @@ def group_view(group: MatrixGroup) -> GroupView:
         group.name, n, d, len(parts), rows, int(skew), int(unrolled), int(bool(matrix)), repr(half), hat, pairs,
         brackets if unrolled else (), matrix,
     )  # fmt: skip
+
+
+def whole_matrix_view(group: MatrixGroup) -> GroupView:
+    """The view in which everything is a whole matrix, for magnus_pullback.c."""
+    basis, d = np.asarray(group.basis), group.degree
+    parts = (basis.real, basis.imag) if group.is_complex else (basis.real,)
+    skew = bool(np.all(basis == -np.conj(np.swapaxes(basis, 1, 2))))
+    flat = np.concatenate([part.reshape(group.dim, d * d) for part in parts], axis=1)
+    hat, back = (tuple(_terms(column) for column in table) for table in (flat.T, flat))
+    return GroupView(group.name, group.dim, d, len(parts), d, int(skew), 0, 0, repr(0.0), hat, (), (), (), back)
 
 
 def _terms(column: Array) -> tuple[Term, ...]:

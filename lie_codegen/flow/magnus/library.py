@@ -82,6 +82,33 @@ class MagnusLibrary:
         library.magnus_tangents.argtypes = (pointer, ctypes.c_double, size, pointer, pointer, pointer)
         return library
 
+    @cached_property
+    def _reverse(self) -> ctypes.CDLL:
+        size, pointer = ctypes.c_ssize_t, ctypes.c_void_p
+        library = _opened(self.group, "magnus_pullback")
+        if library is None:
+            raise CompileError(f"{self.group.name}: the reverse derivatives of its Magnus steps do not compile")
+        for each in (library.magnus_lane_products, library.magnus_pullback):
+            each.restype = None
+        library.magnus_lane_products.argtypes = (pointer, pointer, size, pointer)
+        library.magnus_pullback.argtypes = (pointer, pointer, size, pointer, pointer)
+        return library
+
+    def lane_products(self, values: Array, lengths: Array, projection: Array) -> Array:
+        """(8, d, d) the products of the steps in eight runs, u given by its (steps, nodes, n) values at nodes."""
+        u, d = _table_input(values, projection), self.group.degree
+        X = np.empty((_LANES, d, d), complex if self.group.is_complex else float)
+        self._reverse.magnus_lane_products(ctypes.addressof(u), lengths.ctypes.data, len(lengths), X.ctypes.data)
+        return X
+
+    def pullback(self, values: Array, lengths: Array, projection: Array, covectors: Array) -> Array:
+        """(steps, nodes, n): what the (8, d, d) covectors after the runs of `lane_products` are on the values."""
+        u, slopes = _table_input(values, projection), np.empty_like(values)
+        self._reverse.magnus_pullback(
+            ctypes.addressof(u), lengths.ctypes.data, len(lengths), covectors.ctypes.data, slopes.ctypes.data
+        )
+        return slopes
+
     def one(self, drive: Drive, steps: Steps, order: int, X0: Array, first: int, last: int) -> tuple[Array, Array]:
         """One trajectory over steps first .. last - 1 from X0: X where a span ends whose slot is not negative, and at the end.
 
@@ -132,6 +159,11 @@ class MagnusLibrary:
         return X, dX
 
 
+def _table_input(values: Array, projection: Array) -> Input:
+    """u by its values at the nodes of every step; the arrays have to stay."""
+    return Input(nodes=values.shape[1], table=values.ctypes.data, projection=projection.ctypes.data)
+
+
 def read_by(drive: Drive, who: int) -> Input:
     """The drive of trajectory `who` as the C reads it; the drive's arrays have to stay."""
     formula = drive.formula
@@ -175,11 +207,12 @@ def _opened(group: MatrixGroup, stem: str) -> ctypes.CDLL | None:
 
     def files() -> dict[str, str]:
         from lie_codegen.codegen.templates import render
-        from lie_codegen.flow.magnus.group_view import group_view
+        from lie_codegen.flow.magnus.group_view import group_view, whole_matrix_view
 
+        view = (whole_matrix_view if stem == "magnus_pullback" else group_view)(group)
         names = (f"{stem}.c", *_HEADERS, *(("magnus_solve.h",) if stem == "magnus" else ()))
         plain = {name: (template_folder() / name).read_text(encoding="utf-8") for name in names}
-        return {**plain, "magnus_group.h": render("magnus_group.h.jinja", group=group_view(group))}
+        return {**plain, "magnus_group.h": render("magnus_group.h.jinja", group=view)}
 
     try:
         path = build_source(

@@ -14,9 +14,9 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.parametric_input import ParametricInput
 
 #: Gauss-Legendre: the moments of two waves' worth of h^11 beyond the order of the steps.
-_NODES, _WEIGHTS = (each / 2 for each in np.polynomial.legendre.leggauss(6))
+NODES, _WEIGHTS = (each / 2 for each in np.polynomial.legendre.leggauss(6))
 _GRAM = np.array([[(0 if (i + j) % 2 else 1 / ((i + j + 1) * 2.0 ** (i + j))) for j in range(4)] for i in range(4)])
-_PROJECTION = np.ascontiguousarray(np.linalg.solve(_GRAM, np.array([_WEIGHTS * _NODES**i for i in range(4)])))
+PROJECTION = np.ascontiguousarray(np.linalg.solve(_GRAM, np.array([_WEIGHTS * NODES**i for i in range(4)])))
 #: Values of u and of its derivatives that are held at once.
 _MOST_VALUES = 2**22
 
@@ -27,7 +27,7 @@ def tangents(
     """(m, d, d) dX/dp over [0, length], by at least so many equal steps of order 8 that do not straddle a breakpoint."""
     ends = np.array([0.0, *(b for b in u.breakpoints if 0 < b < length), length])
     m = len(u.parameters)
-    most = max(1, _MOST_VALUES // (len(_NODES) * group.dim * (m + 1)))
+    most = max(1, _MOST_VALUES // (len(NODES) * group.dim * (m + 1)))
     kind = complex if group.is_complex else float
     X, dX = np.eye(group.degree, dtype=kind), np.zeros((m, group.degree, group.degree), kind)
     for a, b in pairwise(ends):
@@ -44,15 +44,15 @@ def _piece(
     group: MatrixGroup, u: ParametricInput, parameters: Mapping[str, float], left: float, right: float, count: int
 ) -> tuple[Array, Array]:
     h = (right - left) / count
-    t = (left + h * (np.arange(count)[:, None] + 0.5 + _NODES)).ravel()
-    n, m, nodes = group.dim, len(u.parameters), len(_NODES)
+    t = (left + h * (np.arange(count)[:, None] + 0.5 + NODES)).ravel()
+    n, m, nodes = group.dim, len(u.parameters), len(NODES)
     values = u(t, **parameters).reshape(count, nodes, n)
     slopes = np.ascontiguousarray(u.derivatives(t, **parameters).reshape(count, nodes, m, n))
     library = magnus_library(group)
     if library is not None:
-        return library.tangents(np.ascontiguousarray(values), slopes, _PROJECTION, right - left)
+        return library.tangents(np.ascontiguousarray(values), slopes, PROJECTION, right - left)
     return _by_doubling(
-        group, h * np.einsum("jg,kgi->kji", _PROJECTION, values), h * np.einsum("jg,kgpi->kpji", _PROJECTION, slopes)
+        group, h * np.einsum("jg,kgi->kji", PROJECTION, values), h * np.einsum("jg,kgpi->kpji", PROJECTION, slopes)
     )
 
 
