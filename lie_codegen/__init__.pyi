@@ -129,6 +129,7 @@ from .mechanics import feedback_kernels as feedback_kernels
 from .mechanics import lagrangian_kernels as lagrangian_kernels
 from .mechanics import lagrangian_system as lagrangian_system
 from .mechanics import linear_controllability as linear_controllability
+from .mechanics import mechanical_system as mechanical_system
 from .mechanics import relative_equilibria as relative_equilibria
 from .mechanics import relative_equilibrium as relative_equilibrium
 from .mechanics import routh_reduce as routh_reduce

@@ -11,6 +11,7 @@ from .driven_step import driven_step as driven_step
 from .kernels import euler_poincare_kernel as euler_poincare_kernel
 from .kernels import spatial_momentum_kernel as spatial_momentum_kernel
 from .lagrangian import lagrangian_system as lagrangian_system
+from .mechanical_system import mechanical_system as mechanical_system
 from .relative_equilibria import linear_controllability as linear_controllability
 from .relative_equilibria import relative_equilibria as relative_equilibria
 from .relative_equilibria import relative_equilibrium as relative_equilibrium

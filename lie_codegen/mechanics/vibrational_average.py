@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,8 @@ from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
+from lie_codegen.mechanics.mechanical_average import MechanicalAverage, mechanical_average
+from lie_codegen.mechanics.mechanical_system import MechanicalSystem
 from lie_codegen.mechanics.routh import RouthReduction
 from lie_codegen.mechanics.vector_fields import Field
 from lie_codegen.mechanics.vibrational_fields import VibrationalFields, vibrational_fields
@@ -147,6 +149,13 @@ class VibrationalAverage(Value):
         return [given[name] for name in names]
 
 
+@overload
+def vibrational_average(
+    system: MechanicalSystem, u: PeriodicInput, order: int = 2, gauge: str = "zero_mean", *, mean_to_drift: bool = False
+) -> MechanicalAverage: ...
+
+
+@overload
 def vibrational_average(
     system: LagrangianSystem | RouthReduction,
     u: PeriodicInput,
@@ -154,13 +163,23 @@ def vibrational_average(
     gauge: str = "zero_mean",
     *,
     mean_to_drift: bool = False,
-) -> VibrationalAverage:
+) -> VibrationalAverage: ...
+
+
+def vibrational_average(
+    system: Any,
+    u: PeriodicInput,
+    order: int = 2,
+    gauge: str = "zero_mean",
+    *,
+    mean_to_drift: bool = False,
+) -> Any:
     """The averaged system of a mechanical system under fast, strong, periodic inputs (1/eps) u(t / eps).
 
     Args:
-        system: of lc.lagrangian_system or lc.routh_reduce.
+        system: of lc.mechanical_system (on a group, any order up to 5), lc.lagrangian_system or lc.routh_reduce.
         u: lc.PeriodicInput in fast time, one component an input of the system, of zero mean.
-        order: 1 or 2.
+        order: 1 or 2; on a group 1 to 5.
         gauge: "zero_mean" or "pull_back" (the averaged state equals the actual one at the start of each period).
         mean_to_drift: apply the mean of u as a constant force, not divided by eps.
 
@@ -171,6 +190,8 @@ def vibrational_average(
     """
     if not isinstance(u, PeriodicInput):
         raise InputError(f"vibrational_average: u is {type(u).__name__}; make it a PeriodicInput")
+    if isinstance(system, MechanicalSystem):
+        return mechanical_average(system, u, order, gauge, mean_to_drift=mean_to_drift)
     return VibrationalAverage(vibrational_fields(system, u, order=order, gauge=gauge, mean_to_drift=mean_to_drift))
 
 

@@ -115,14 +115,17 @@ def _parse(expression: sp.Expr, period: sp.Expr) -> TimePolynomial:
             continue
         if not isinstance(wave, sp.sin | sp.cos):
             raise InputError(f"{wave} is no sine or cosine")
-        ratio = sp.simplify(wave.args[0] / TIME * period / (2 * sp.pi))
+        argument = sp.expand(wave.args[0])
+        phase = argument.xreplace({TIME: sp.S.Zero})
+        ratio = sp.simplify((argument - phase) / TIME * period / (2 * sp.pi))
         if not ratio.is_Integer:
             raise InputError(f"{wave} is not periodic with period {period}")
         n, half = int(ratio), factor / 2
+        turn, back = (sp.cos(phase) + sign * sp.I * sp.sin(phase) for sign in (1, -1))
         if isinstance(wave, sp.cos):
-            pairs += [((0, n), half), ((0, -n), half)]
+            pairs += [((0, n), half * turn), ((0, -n), half * back)]
         else:
-            pairs += [((0, n), -sp.I * half), ((0, -n), sp.I * half)]
+            pairs += [((0, n), -sp.I * half * turn), ((0, -n), sp.I * half * back)]
     return _collect(pairs, period)
 
 
