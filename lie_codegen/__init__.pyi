@@ -17,6 +17,7 @@ from . import pictures as pictures
 from . import rigid_body as rigid_body
 from . import signals as signals
 from . import steering as steering
+from . import studies as studies
 from . import vehicles as vehicles
 
 # averaging
@@ -179,6 +180,26 @@ from .steering import ocp as ocp
 from .steering import qutip_evolution as qutip_evolution
 from .steering import shooter as shooter
 from .steering import steer as steer
+
+# studies
+from .studies import Choice as Choice
+from .studies import Distribution as Distribution
+from .studies import Engine as Engine
+from .studies import Grid as Grid
+from .studies import Joint as Joint
+from .studies import LatinHypercube as LatinHypercube
+from .studies import LogUniform as LogUniform
+from .studies import Normal as Normal
+from .studies import OnGroup as OnGroup
+from .studies import Quantile as Quantile
+from .studies import Run as Run
+from .studies import Sobol as Sobol
+from .studies import Study as Study
+from .studies import Uniform as Uniform
+from .studies import each as each
+from .studies import open_study as open_study
+from .studies import study as study
+from .studies import study_from_file as study_from_file
 
 # vehicles
 from .vehicles import Potential as Potential

@@ -15,7 +15,7 @@ import lie_codegen
 #: From the ground up; imports point down (or stay on their floor), lazy ones and those for type checkers included.
 LAYERS = (
     "errors", "identifiers", "arrays", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
-    "control", "vehicles", "rigid_body", "averaging", "steering", "studies", "pictures", "gallery", "benchmarks", "cli",
+    "control", "vehicles", "rigid_body", "averaging", "steering", "pictures", "studies", "gallery", "benchmarks", "cli",
 )  # fmt: skip
 PACKAGE = Path(lie_codegen.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -25,8 +25,13 @@ ALLOWED = {
     "sympy": {"exact", "algebra", "kernel", *SUBJECTS, "gallery"},
     "casadi": {"kernel", "codegen", "steering", "gallery", "benchmarks"},
     "jinja2": {"codegen"},
-    "scipy": {*SUBJECTS, "gallery", "benchmarks"},
+    "scipy": {*SUBJECTS, "studies", "gallery", "benchmarks"},
     "dask": {"studies", "benchmarks"},
+    "distributed": {"studies"},
+    "zarr": {"studies"},
+    "xarray": {"studies"},
+    "cloudpickle": {"studies"},
+    "pyarrow": {"studies"},
     "rockit": {"benchmarks"},
     "crocoddyl": {"benchmarks"},
     "qutip": {"benchmarks", "steering"},
@@ -34,9 +39,9 @@ ALLOWED = {
     "mpmath": {"gallery"},
     "matplotlib": {"pictures", "gallery"},
     "typer": {"cli"},
-    "rich": {"cli"},
+    "rich": {"cli", "studies"},
     "platformdirs": {"runtime"},
-    "filelock": {"runtime"},
+    "filelock": {"runtime", "studies"},
     "numpy": set(LAYERS),
     "lazy_loader": {None, *LAYERS},
     "ziglang": {"runtime"},
