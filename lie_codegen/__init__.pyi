@@ -29,6 +29,7 @@ from .averaging import convergence as convergence
 from .averaging import corollary_bound as corollary_bound
 from .averaging import corollary_check as corollary_check
 from .averaging import feedback_average as feedback_average
+from .averaging import floquet as floquet
 from .averaging import line_drift as line_drift
 from .averaging import magnus as magnus
 from .averaging import moments as moments

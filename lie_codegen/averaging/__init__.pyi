@@ -10,6 +10,7 @@ from .convergence import convergence as convergence
 from .corollary_bounds import corollary_bound as corollary_bound
 from .corollary_bounds import corollary_check as corollary_check
 from .feedback import feedback_average as feedback_average
+from .floquet_orbit import floquet as floquet
 from .kernels import averaged_kernels as averaged_kernels
 from .magnus import magnus as magnus
 from .order_check import order_check as order_check

@@ -49,6 +49,9 @@ class Backend(Protocol):
     def loop_address(self, *, many: bool) -> int:
         """Where the C of `scan` (`scan_batch`) is; 0 if there is none."""
 
+    def call_address(self) -> int:
+        """Where the C of `call` is, of pointers to inputs and outputs; 0 if there is none."""
+
 
 class _Workspace:
     """Buffers of one call, with their addresses; asking numpy for an address costs more than a kernel."""
@@ -126,6 +129,9 @@ class CtypesBackend:
             return 0
         return ctypes.cast(self._scan_batch if many else self._scan, ctypes.c_void_p).value or 0
 
+    def call_address(self) -> int:
+        return ctypes.cast(self._call, ctypes.c_void_p).value or 0
+
 
 class InterpretedBackend:
     """CasADi's interpreter: the same numbers, without a compiler."""
@@ -183,6 +189,9 @@ class InterpretedBackend:
             self.scan(steps, every, mine, [step for _, step in strides], trajectories[j])
 
     def loop_address(self, *, many: bool) -> int:
+        return 0
+
+    def call_address(self) -> int:
         return 0
 
 

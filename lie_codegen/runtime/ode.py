@@ -1,0 +1,301 @@
+"""Differential equations of compiled kernels, stepped in C: error control of order 8, events, dense output; see templates/ode.c."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any, TypeGuard
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lie_codegen.arrays import Array
+from lie_codegen.codegen.templates import template_folder
+from lie_codegen.errors import CompileError, ComputationError, InputError, ShapeError
+from lie_codegen.runtime import dop853, ode_numpy
+from lie_codegen.runtime.backend import load_library
+from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.sources import build_source
+
+#: Results of a run: reached the end, an event, more knots are wanted, no step is short enough.
+REACHED, EVENT, FULL, STUCK = 0, 1, 2, 3
+_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)
+_FIRST_KNOTS, _MOST_DOUBLES = 256, 2**27
+
+
+class _Field(ctypes.Structure):
+    _fields_ = [("call", ctypes.c_void_p), ("other", ctypes.c_void_p)] + [
+        (n, ctypes.c_ssize_t) for n in ("size", "inputs", "state", "time", "outputs")
+    ] + [("in_", ctypes.c_void_p), ("out", ctypes.c_void_p)]  # fmt: skip
+
+
+class _Rules(ctypes.Structure):
+    _fields_ = [
+        ("rtol", ctypes.c_double),
+        ("atol", ctypes.c_void_p),
+        ("first", ctypes.c_double),
+        ("longest", ctypes.c_double),
+        ("direction", ctypes.c_void_p),
+        ("events", ctypes.c_ssize_t),
+    ]
+
+
+class Field:
+    """f(t, y) of a compiled kernel, or of a Python function, as C calls it.
+
+    Args:
+        rate: a kernel whose input `state` is y and whose first output is f (or the values of events); or f(t, y) -> (n,).
+        size: n, the size of y, also where the values are those of events.
+        state, time: names of the kernel's inputs; time None where it has none.
+        constants: the other inputs, by name.
+    """
+
+    def __init__(
+        self,
+        rate: Compiled[Any] | Callable[[float, Array], ArrayLike],
+        size: int,
+        *,
+        state: str = "y",
+        time: str | None = "t",
+        constants: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        self.size, self.rate = size, rate
+        self._error: BaseException | None = None
+        if not _is_kernel(rate):
+            self.address, self.places, self.inputs = 0, (0, 0), []
+            self.outputs: list[Array] = []
+            return
+        names = [port.name for port in rate.inputs]
+        given = dict(constants or {})
+        self.places = (names.index(state), names.index(time) if time in names else -1)
+        self.inputs = [
+            np.zeros(port.shape) if number in self.places
+            else np.ascontiguousarray(np.broadcast_to(np.asarray(given.pop(port.name), dtype=float), port.shape))
+            for number, port in enumerate(rate.inputs)
+        ]  # fmt: skip
+        if given:
+            raise InputError(f"{rate.name} has no input {', '.join(given)}")
+        if rate.inputs[self.places[0]].size != size:
+            raise ShapeError(f"{rate.name}: {state} has {rate.inputs[self.places[0]].size} entries, not {size}")
+        self.outputs = [np.zeros(port.shape) for port in rate.outputs]
+        self.address = rate.backend.call_address()
+
+    def __call__(self, t: float, y: Array) -> Array:
+        """f(t, y), by Python."""
+        if not _is_kernel(self.rate):
+            return np.asarray(self.rate(t, y), dtype=float)
+        given: list[Any] = list(self.inputs)
+        given[self.places[0]] = np.reshape(y, self.rate.inputs[self.places[0]].shape)
+        if self.places[1] >= 0:
+            given[self.places[1]] = t
+        result = self.rate(*given)
+        first = result if len(self.rate.outputs) == 1 else result[0]
+        return np.atleast_1d(np.asarray(first, dtype=float)).ravel()
+
+    @cached_property
+    def record(self) -> _Field:
+        """What the C code reads."""
+        pointers = (ctypes.c_void_p * max(1, len(self.inputs)))(*[each.ctypes.data for each in self.inputs])
+        results = (ctypes.c_void_p * max(1, len(self.outputs)))(*[each.ctypes.data for each in self.outputs])
+        callback = None if self.address else _CALLBACK(self._called)
+        self._kept = (pointers, results, callback)  # alive as long as the field is
+        return _Field(
+            self.address or None,
+            None if callback is None else ctypes.cast(callback, ctypes.c_void_p).value,
+            self.size, len(self.inputs), *self.places, len(self.outputs),
+            ctypes.cast(pointers, ctypes.c_void_p).value, ctypes.cast(results, ctypes.c_void_p).value,
+        )  # fmt: skip
+
+    def _called(self, t: float, y: int, result: int) -> int:
+        try:
+            state = np.ctypeslib.as_array(ctypes.cast(y, ctypes.POINTER(ctypes.c_double)), (self.size,))
+            found = self(t, state.copy())
+            np.ctypeslib.as_array(ctypes.cast(result, ctypes.POINTER(ctypes.c_double)), found.shape)[:] = found
+        except BaseException as error:  # it cannot pass through C; `raise_pending` raises it on the other side
+            self._error = error
+            return 1
+        return 0
+
+    def raise_pending(self) -> None:
+        """Raise what a Python function raised while C called it."""
+        error, self._error = self._error, None
+        if error is not None:
+            raise error
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A solution between t[0] and t[-1]: the knots of the steps, and any time between by a fresh partial step.
+
+    Attributes:
+        t: (K,) knots, monotone.
+        y: (K, n) states.
+        status: REACHED or EVENT, or STUCK where no step was short enough or f had no finite value.
+        event: number of the event that ended it; -1 if none.
+        evaluations: of f.
+    """
+
+    t: Array
+    y: Array
+    status: int
+    event: int
+    evaluations: int
+    field: Field = field(repr=False)
+
+    def at(self, t: ArrayLike) -> Array:
+        """(...,) -> (..., n).
+
+        Raises:
+            InputError: a time outside of the run.
+        """
+        wanted = np.asarray(t, dtype=float)
+        flat = np.ascontiguousarray(wanted.ravel())
+        sign = 1.0 if self.t[-1] >= self.t[0] else -1.0
+        slack = 1e-12 * max(1.0, float(np.max(np.abs(self.t))))
+        if flat.size and (
+            np.min(sign * flat) < sign * self.t[0] - slack or np.max(sign * flat) > sign * self.t[-1] + slack
+        ):
+            raise InputError(f"the solution is known from t = {self.t[0]:.9g} to {self.t[-1]:.9g}")
+        knot = np.clip(np.searchsorted(sign * self.t, sign * flat, side="right") - 1, 0, len(self.t) - 1).astype(
+            np.intp
+        )
+        found = np.empty((flat.size, self.field.size))
+        library = _library()
+        if library is None or _only_python(self.field):
+            for i, (moment, k) in enumerate(zip(flat, knot, strict=True)):
+                found[i] = ode_numpy.partial(self.field, self.t[k], self.y[k], float(moment) - self.t[k])
+        else:
+            work = np.empty(int(library.lie_codegen_ode_work(self.field.size, 0)))
+            library.lie_codegen_ode_at(
+                ctypes.byref(self.field.record), *_pointers(self.t, self.y), ctypes.c_ssize_t(flat.size),
+                *_pointers(flat, knot, found, work),
+            )  # fmt: skip
+            self.field.raise_pending()
+        return found.reshape((*wanted.shape, self.field.size))
+
+
+def integrate(
+    rate: Field,
+    start: ArrayLike,
+    t0: float,
+    t1: float,
+    *,
+    rtol: float = 1e-12,
+    atol: ArrayLike = 1e-14,
+    events: Field | None = None,
+    directions: Sequence[int] = (),
+    longest: float = math.inf,
+) -> Motion:
+    """y' = f(t, y) from t0 to t1 or to the first event, by steps of order 8(5, 3).
+
+    Args:
+        rate: f.
+        start: (n,).
+        t0, t1: in either order.
+        rtol, atol: error of a step, relative and absolute (a number, or one a component).
+        events: values whose changes of sign end the run.
+        directions: one an event: 1 from negative to positive, -1 the other way, 0 both.
+        longest: no step is longer.
+
+    Raises:
+        ComputationError: more knots than memory should hold.
+    """
+    y0 = np.array(start, dtype=float).ravel()
+    tolerance = np.ascontiguousarray(np.broadcast_to(np.asarray(atol, dtype=float), y0.shape))
+    if t0 == t1:
+        return Motion(np.array([t0]), y0[None], REACHED, -1, 0, rate)
+    library = _library()
+    if library is None or _only_python(rate, events):
+        found = ode_numpy.run(rate, y0, t0, t1, rtol, tolerance, events, directions, longest)
+        return Motion(*found, rate)
+    wanted = np.array([*directions, 0], dtype=np.intp)
+    rules = _Rules(rtol, tolerance.ctypes.data, 0.0, longest, wanted.ctypes.data, len(directions))
+    work = np.empty(int(library.lie_codegen_ode_work(rate.size, len(directions))))
+    none = ctypes.c_void_p(None)
+    pieces_t, pieces_y, count, result = [np.array([t0])], [y0[None]], _FIRST_KNOTS, np.zeros(4)
+    evaluations, held = 0, 1
+    while True:
+        times, states = np.empty(count), np.empty((count, rate.size))
+        times[0], states[0] = pieces_t[-1][-1], pieces_y[-1][-1]
+        status = library.lie_codegen_ode_run(
+            ctypes.byref(rate.record), none if events is None else ctypes.byref(events.record), ctypes.byref(rules),
+            ctypes.c_double(t1), ctypes.c_ssize_t(count), *_pointers(times, states, work, result),
+        )  # fmt: skip
+        for each in (rate, events):
+            if each is not None:
+                each.raise_pending()
+        kept = int(result[0])
+        pieces_t.append(times[1:kept].copy())
+        pieces_y.append(states[1:kept].copy())
+        evaluations, rules.first, held = evaluations + int(result[3]), result[1], held + kept - 1
+        if status != FULL:
+            event = int(result[2]) if status == EVENT else -1
+            return Motion(np.concatenate(pieces_t), np.concatenate(pieces_y), status, event, evaluations, rate)
+        if held * rate.size > _MOST_DOUBLES:
+            raise ComputationError(
+                f"the solution takes more than {held} steps up to t = {times[kept - 1]:.6g}: it is stiff, or too long"
+            )
+        count = min(2 * count, max(_FIRST_KNOTS, _MOST_DOUBLES // (8 * rate.size)))
+
+
+def fixed_steps(rate: Field, start: ArrayLike, t0: float, h: float, spans: int, parts: int = 1) -> Array:
+    """(spans + 1, n) states every `parts` steps of length h of the classical method of order 4, with f smooth or not."""
+    states = np.empty((spans + 1, rate.size))
+    states[0] = np.asarray(start, dtype=float).ravel()
+    library = _library()
+    if library is None or _only_python(rate):
+        return ode_numpy.fixed(rate, states, t0, h, parts)
+    work = np.empty(6 * rate.size)
+    library.lie_codegen_ode_fixed(
+        ctypes.byref(rate.record), ctypes.c_double(t0), ctypes.c_double(h), ctypes.c_ssize_t(spans),
+        ctypes.c_ssize_t(parts), *_pointers(states, work),
+    )  # fmt: skip
+    rate.raise_pending()
+    return states
+
+
+def _is_kernel(rate: Any) -> TypeGuard[Compiled[Any]]:
+    """Whether it is a compiled kernel, behind the extension type or not."""
+    return hasattr(rate, "signature") and hasattr(rate, "backend")
+
+
+def _only_python(*fields: Field | None) -> bool:
+    """Whether a kernel among them has no C: CasADi's interpreter is not to be called from C."""
+    return any(each is not None and _is_kernel(each.rate) and not each.address for each in fields)
+
+
+def _pointers(*arrays: Array | NDArray[np.intp]) -> list[ctypes.c_void_p]:
+    return [ctypes.c_void_p(np.ascontiguousarray(each).ctypes.data) for each in arrays]
+
+
+def _table() -> str:
+    rows = ["static const double A[STAGES][STAGES] = {"]
+    rows += [f"    {{ {', '.join(repr(row.get(j, 0.0)) for j in range(len(dop853.A)))} }}," for row in dop853.A]
+    rows.append("};")
+    for name, values in (("B", dop853.B), ("C", dop853.C), ("E3", dop853.E3), ("E5", dop853.E5)):
+        rows.append(f"static const double {name}[STAGES] = {{ {', '.join(map(repr, values))} }};")
+    return "\n".join([f"enum {{ STAGES = {len(dop853.A)} }};", *rows, ""])
+
+
+@lru_cache(maxsize=1)
+def _library() -> ctypes.CDLL | None:
+    """The compiled loops; None where there is no compiler."""
+
+    def files() -> dict[str, str]:
+        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), "ode_table.h": _table()}
+
+    try:
+        path = build_source(files, "ode.c", namespace="lie_codegen_ode", definition="ode")
+    except CompileError:
+        return None
+    if path is None:
+        return None
+    library = load_library(path)
+    for name in ("run", "at", "fixed"):
+        library[f"lie_codegen_ode_{name}"].restype = ctypes.c_int
+    library.lie_codegen_ode_work.restype = ctypes.c_ssize_t
+    library.lie_codegen_ode_work.argtypes = [ctypes.c_ssize_t, ctypes.c_ssize_t]
+    return library

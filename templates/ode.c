@@ -1,0 +1,344 @@
+/*
+ * Ordinary differential equations y' = f(t, y) of compiled kernels: steps of order 8(5, 3) with error control, events, and
+ * plain steps of order 4. The solution between two knots is a fresh, shorter step from the first: as exact as the steps are,
+ * and no interpolant is needed. Plain C99, no allocation: the caller gives the workspace.
+ */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "ode_table.h" /* A, B, C, E3, E5 of twelve stages */
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT
+#endif
+
+enum { MOST_PORTS = 32, REACHED = 0, EVENT = 1, FULL = 2, STUCK = 3 };
+
+typedef void (*kernel_call)(const double *const *, double *const *);
+typedef int (*python_call)(double, const double *, double *);
+
+/* A kernel whose input number `state` is y and `time` is t (-1: none); its first output is f, or the values of the events. */
+typedef struct {
+    kernel_call call;
+    python_call other; /* in place of a kernel */
+    ptrdiff_t size, inputs, state, time, outputs;
+    const double *const *in;
+    double *const *out;
+} Field;
+
+typedef struct {
+    double rtol;
+    const double *atol; /* size */
+    double first, longest;
+    const ptrdiff_t *direction; /* events: 1 rising, -1 falling, 0 both */
+    ptrdiff_t events;
+} Rules;
+
+EXPORT ptrdiff_t lie_codegen_ode_work(ptrdiff_t size, ptrdiff_t events);
+EXPORT ptrdiff_t lie_codegen_ode_work(ptrdiff_t size, ptrdiff_t events)
+{
+    return (STAGES + 5) * size + 3 * (events + 1);
+}
+
+static int evaluate(const Field *field, double t, const double *y, double *result)
+{
+    const double *in[MOST_PORTS];
+    double *out[MOST_PORTS];
+    if (field->other) {
+        return field->other(t, y, result);
+    }
+    memcpy(in, field->in, (size_t)field->inputs * sizeof *in);
+    memcpy(out, field->out, (size_t)field->outputs * sizeof *out);
+    in[field->state] = y;
+    if (field->time >= 0) {
+        in[field->time] = &t;
+    }
+    out[0] = result;
+    field->call(in, out);
+    return 0;
+}
+
+/* The stages k_2 .. k_12 of a step of length h from (t, y), k_1 being known, and the state after it. */
+static int step(const Field *field, double t, const double *y, double h, double *k, double *next)
+{
+    const ptrdiff_t n = field->size;
+    ptrdiff_t i;
+    int s, j;
+    for (s = 1; s < STAGES; ++s) {
+        for (i = 0; i < n; ++i) {
+            double sum = 0.0;
+            for (j = 0; j < s; ++j) {
+                sum += A[s][j] * k[j * n + i];
+            }
+            next[i] = y[i] + h * sum;
+        }
+        if (evaluate(field, t + C[s] * h, next, k + s * n)) {
+            return 1;
+        }
+    }
+    for (i = 0; i < n; ++i) {
+        double sum = 0.0;
+        for (j = 0; j < STAGES; ++j) {
+            sum += B[j] * k[j * n + i];
+        }
+        next[i] = y[i] + h * sum;
+    }
+    return 0;
+}
+
+/* Root mean square of the error in units of the tolerance; NaN counts as infinite. */
+static double error_of(const Field *field, const Rules *rules, const double *y, const double *next, double h, const double *k)
+{
+    const ptrdiff_t n = field->size;
+    double five = 0.0, three = 0.0, both;
+    ptrdiff_t i;
+    int j;
+    for (i = 0; i < n; ++i) {
+        const double scale = rules->atol[i] + rules->rtol * fmax(fabs(y[i]), fabs(next[i]));
+        double a = 0.0, b = 0.0;
+        for (j = 0; j < STAGES; ++j) {
+            a += E5[j] * k[j * n + i];
+            b += E3[j] * k[j * n + i];
+        }
+        five += a * a / (scale * scale);
+        three += b * b / (scale * scale);
+        if (!(fabs(next[i]) < HUGE_VAL)) {
+            return HUGE_VAL;
+        }
+    }
+    if (five == 0.0 && three == 0.0) {
+        return 0.0;
+    }
+    both = fabs(h) * five / sqrt((five + 0.01 * three) * (double)n);
+    return both < HUGE_VAL ? both : HUGE_VAL;
+}
+
+/* How long the first step may be (Hairer, Norsett, Wanner, II.4). */
+static double first_step(const Field *field, const Rules *rules, double t, const double *y, const double *k, double span, double *other, double *slope)
+{
+    const ptrdiff_t n = field->size;
+    double d0 = 0.0, d1 = 0.0, d2 = 0.0, h, most;
+    ptrdiff_t i;
+    for (i = 0; i < n; ++i) {
+        const double scale = rules->atol[i] + rules->rtol * fabs(y[i]);
+        d0 += y[i] * y[i] / (scale * scale);
+        d1 += k[i] * k[i] / (scale * scale);
+    }
+    d0 = sqrt(d0 / (double)n);
+    d1 = sqrt(d1 / (double)n);
+    h = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
+    h = copysign(fmin(h, fabs(span)), span);
+    for (i = 0; i < n; ++i) {
+        other[i] = y[i] + h * k[i];
+    }
+    if (evaluate(field, t + h, other, slope)) {
+        return h;
+    }
+    for (i = 0; i < n; ++i) {
+        const double scale = rules->atol[i] + rules->rtol * fabs(y[i]);
+        d2 += (slope[i] - k[i]) * (slope[i] - k[i]) / (scale * scale);
+    }
+    d2 = sqrt(d2 / (double)n) / fabs(h);
+    most = fmax(d1, d2);
+    most = most <= 1e-15 ? fmax(1e-6, fabs(h) * 1e-3) : pow(0.01 / most, 1.0 / 8.0);
+    return most > 0.0 ? copysign(fmin(fmin(100.0 * fabs(h), most), fabs(span)), span) : h;
+}
+
+static int crossed(double before, double after, ptrdiff_t direction)
+{
+    return (before < 0.0 && after >= 0.0 && direction >= 0) || (before > 0.0 && after <= 0.0 && direction <= 0);
+}
+
+/* Where within the step the event changes sign, as a fraction of it just behind the change: regula falsi, halved where it lags. */
+static double locate(const Field *field, const Field *events, ptrdiff_t which, double t, const double *y, double h, double *k, double *next, double *values, double before, double after)
+{
+    double low = 0.0, high = 1.0, a = before, b = after;
+    int i, side = 0;
+    for (i = 0; i < 100 && high - low > 1e-15; ++i) {
+        double middle = i % 3 == 2 ? 0.5 * (low + high) : (low * b - high * a) / (b - a);
+        double value;
+        if (!(middle > low && middle < high)) {
+            middle = 0.5 * (low + high);
+            if (middle == low || middle == high) {
+                break;
+            }
+        }
+        if (step(field, t, y, middle * h, k, next) || evaluate(events, t + middle * h, next, values)) {
+            break;
+        }
+        value = values[which];
+        if ((value > 0.0) == (before > 0.0) && value != 0.0) {
+            low = middle;
+            a = value;
+            b = side == -1 ? 0.5 * b : b;
+            side = -1;
+        } else {
+            high = middle;
+            b = value;
+            a = side == 1 ? 0.5 * a : a;
+            side = 1;
+            if (value == 0.0) {
+                break;
+            }
+        }
+    }
+    return high;
+}
+
+/*
+ * Steps from knot 0 (its time and state are given in `times` and `states`) towards `end` until there, until an event, or until
+ * `most` knots are written. result: number of knots, length of the next step, the event, evaluations.
+ */
+EXPORT int lie_codegen_ode_run(const Field *field, const Field *events, const Rules *rules, double end, ptrdiff_t most, double *times, double *states, double *work, double *result);
+EXPORT int lie_codegen_ode_run(const Field *field, const Field *events, const Rules *rules, double end, ptrdiff_t most, double *times, double *states, double *work, double *result)
+{
+    const ptrdiff_t n = field->size, count = rules->events;
+    double *k = work, *next = k + STAGES * n, *spare = next + n, *slope = spare + n;
+    double *before = slope + 2 * n, *after = before + count, *values = after + count;
+    double h = rules->first, evaluations = 1.0;
+    ptrdiff_t knots = 1, i;
+    int refused = 0, status = REACHED;
+    if (evaluate(field, times[0], states, k) || (count && evaluate(events, times[0], states, before))) {
+        return STUCK;
+    }
+    if (h == 0.0) {
+        h = first_step(field, rules, times[0], states, k, end - times[0], spare, slope);
+        evaluations += 1.0;
+    }
+    while (times[knots - 1] != end) {
+        const double t = times[knots - 1];
+        const double *y = states + (knots - 1) * n;
+        double error, factor, reached;
+        ptrdiff_t first = -1;
+        if (knots == most) {
+            status = FULL;
+            break;
+        }
+        if (fabs(h) > rules->longest) {
+            h = copysign(rules->longest, h);
+        }
+        /* The last step ends exactly at the end, and no sliver is left for another. */
+        reached = fabs(end - t) <= fabs(h) * (1.0 + 1e-10) ? end : t + h;
+        /* Shorter, a step that is refused and cut by a tenth might round to itself. */
+        if (!(fabs(reached - t) > 4e-15 * fabs(t))) {
+            status = STUCK;
+            break;
+        }
+        if (step(field, t, y, reached - t, k, next)) {
+            status = STUCK;
+            break;
+        }
+        evaluations += STAGES - 1;
+        error = error_of(field, rules, y, next, reached - t, k);
+        if (error >= 1.0) {
+            h = (reached - t) * (error < HUGE_VAL ? fmax(0.2, 0.9 * pow(error, -1.0 / 8.0)) : 0.2);
+            refused = 1;
+            continue;
+        }
+        factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * pow(error, -1.0 / 8.0));
+        h = reached == end && fabs(h) > fabs(reached - t) ? h : (reached - t) * (refused ? fmin(1.0, factor) : fmax(0.2, factor));
+        refused = 0;
+        if (count) {
+            double earliest = 2.0;
+            if (evaluate(events, reached, next, after)) {
+                status = STUCK;
+                break;
+            }
+            for (i = 0; i < count; ++i) {
+                if (crossed(before[i], after[i], rules->direction[i])) {
+                    const double part = locate(field, events, i, t, y, reached - t, k, spare, values, before[i], after[i]);
+                    if (part < earliest) {
+                        earliest = part;
+                        first = i;
+                    }
+                }
+            }
+            if (first >= 0 && earliest < 1.0) {
+                reached = t + earliest * (reached - t);
+                if (step(field, t, y, reached - t, k, next)) {
+                    status = STUCK;
+                    break;
+                }
+            }
+            memcpy(before, after, (size_t)count * sizeof *before);
+        }
+        times[knots] = reached;
+        memcpy(states + knots * n, next, (size_t)n * sizeof *next);
+        ++knots;
+        if (first >= 0) {
+            result[2] = (double)first;
+            status = EVENT;
+            break;
+        }
+        evaluations += 1.0;
+        if (evaluate(field, reached, next, k)) {
+            status = STUCK;
+            break;
+        }
+    }
+    result[0] = (double)knots;
+    result[1] = h;
+    result[3] = evaluations;
+    return status;
+}
+
+/* The solution at `count` times, each from the last knot at or before it (`knot`, in the sense of the run). */
+EXPORT int lie_codegen_ode_at(const Field *field, const double *times, const double *states, ptrdiff_t count, const double *wanted, const ptrdiff_t *knot, double *found, double *work);
+EXPORT int lie_codegen_ode_at(const Field *field, const double *times, const double *states, ptrdiff_t count, const double *wanted, const ptrdiff_t *knot, double *found, double *work)
+{
+    const ptrdiff_t n = field->size;
+    ptrdiff_t i;
+    for (i = 0; i < count; ++i) {
+        const double t = times[knot[i]], *y = states + knot[i] * n;
+        if (wanted[i] == t) {
+            memcpy(found + i * n, y, (size_t)n * sizeof *y);
+        } else if (evaluate(field, t, y, work) || step(field, t, y, wanted[i] - t, work, found + i * n)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* The classical method of order 4 with equal steps: `spans` outputs, `parts` steps between two. */
+EXPORT int lie_codegen_ode_fixed(const Field *field, double start, double h, ptrdiff_t spans, ptrdiff_t parts, double *states, double *work);
+EXPORT int lie_codegen_ode_fixed(const Field *field, double start, double h, ptrdiff_t spans, ptrdiff_t parts, double *states, double *work)
+{
+    const ptrdiff_t n = field->size;
+    double *y = work, *z = y + n, *a = z + n, *b = a + n, *c = b + n, *d = c + n;
+    ptrdiff_t i, j, s;
+    memcpy(y, states, (size_t)n * sizeof *y);
+    for (s = 0; s < spans; ++s) {
+        for (j = 0; j < parts; ++j) {
+            const double t = start + (double)(s * parts + j) * h;
+            if (evaluate(field, t, y, a)) {
+                return 1;
+            }
+            for (i = 0; i < n; ++i) {
+                z[i] = y[i] + 0.5 * h * a[i];
+            }
+            if (evaluate(field, t + 0.5 * h, z, b)) {
+                return 1;
+            }
+            for (i = 0; i < n; ++i) {
+                z[i] = y[i] + 0.5 * h * b[i];
+            }
+            if (evaluate(field, t + 0.5 * h, z, c)) {
+                return 1;
+            }
+            for (i = 0; i < n; ++i) {
+                z[i] = y[i] + h * c[i];
+            }
+            if (evaluate(field, t + h, z, d)) {
+                return 1;
+            }
+            for (i = 0; i < n; ++i) {
+                y[i] += h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+            }
+        }
+        memcpy(states + (s + 1) * n, y, (size_t)n * sizeof *y);
+    }
+    return 0;
+}

@@ -1,0 +1,92 @@
+"""Steps with error control in C and in numpy: order, events, times between knots, errors of Python functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ellipj
+
+import lie_codegen as lc
+from lie_codegen.errors import InputError
+from lie_codegen.runtime import ode
+from lie_codegen.runtime.ode import EVENT, REACHED, STUCK, Field, Motion, fixed_steps, integrate
+
+
+def euler_top(ops, y, t):
+    return ([y[1] * y[2], -y[2] * y[0], -ops.constant(1) / 4 * y[0] * y[1]],)
+
+
+def top():
+    """sn, cn, dn of modulus 1/2 as a compiled kernel."""
+    ports = (lc.Port("y", (3,)), lc.Port("t", ()))
+    return Field(lc.build(lc.Kernel("rate", "ode_top", ports, (lc.Port("y_dot", (3,)),), euler_top)).rate, 3)
+
+
+@pytest.fixture(params=["C", "numpy"])
+def loops(request, monkeypatch):
+    if request.param == "numpy":
+        monkeypatch.setattr(ode, "_library", lambda: None)
+
+
+@pytest.mark.usefixtures("loops")
+def test_elliptic_functions_at_any_time():
+    motion = integrate(top(), [0, 1, 1], 0.0, 20.0)
+    t = np.linspace(0, 20, 61)
+    np.testing.assert_allclose(motion.at(t), np.stack(ellipj(t, 0.25)[:3], axis=1), atol=1e-11)
+    assert motion.status == REACHED
+    back = integrate(top(), motion.y[-1], 20.0, 0.0)
+    np.testing.assert_allclose(back.y[-1], [0, 1, 1], atol=1e-11)
+
+
+@pytest.mark.usefixtures("loops")
+def test_a_single_step_is_of_order_eight():
+    errors = []
+    for h in (0.8, 0.4):
+        knots = Motion(np.array([0.0, 1.0]), np.array([[0.0, 1, 1], [0, 1, 1]]), REACHED, -1, 0, top())
+        errors.append(abs(knots.at(h)[0] - ellipj(h, 0.25)[0]))  # one step of length h from the first knot
+    assert 8.5 < np.log2(errors[0] / errors[1]) < 9.8
+
+
+@pytest.mark.usefixtures("loops")
+def test_events_end_the_run_where_they_happen():
+    events = Field(lambda t, y: np.array([y[0] + 0.5, y[1] - 3]), 3)
+    motion = integrate(top(), [0, 1, 1], 0.0, 20.0, events=events, directions=[-1, 0])
+    assert (motion.status, motion.event) == (EVENT, 0)
+    assert motion.y[-1, 0] == pytest.approx(-0.5, abs=1e-12)
+    assert motion.at(motion.t[-1])[0] <= -0.5
+    rising = integrate(top(), [0, 1, 1], 0.0, 20.0, events=events, directions=[1, 0])
+    assert rising.t[-1] > motion.t[-1]
+
+
+@pytest.mark.usefixtures("loops")
+def test_python_functions_and_their_errors():
+    def f(t, y):
+        if t > 1:
+            raise KeyError("mine")
+        return -y
+
+    assert integrate(Field(f, 1), [1.0], 0.0, 1.0).y[-1, 0] == pytest.approx(np.exp(-1), abs=1e-12)
+    with pytest.raises(KeyError, match="mine"):
+        integrate(Field(f, 1), [1.0], 0.0, 3.0)
+
+
+@pytest.mark.usefixtures("loops")
+def test_a_pole_is_no_number():
+    motion = integrate(Field(lambda t, y: y**2, 1), [1.0], 0.0, 2.0)
+    assert motion.status == STUCK
+    assert motion.t[-1] == pytest.approx(1, abs=1e-6)
+    with pytest.raises(InputError, match="is known from"):
+        motion.at(1.5)
+
+
+@pytest.mark.usefixtures("loops")
+def test_equal_steps_are_of_order_four():
+    exact = np.stack(ellipj(2.0, 0.25)[:3])
+    errors = [np.abs(fixed_steps(top(), [0, 1, 1], 0.0, 2 / n, 2, n // 2)[-1] - exact).max() for n in (20, 40)]
+    assert 3.7 < np.log2(errors[0] / errors[1]) < 4.4
+
+
+def test_many_knots_are_kept():
+    motion = integrate(Field(lambda t, y: np.array([y[1], -y[0]]), 2), [0, 1], 0.0, 100.0, longest=0.1)
+    assert len(motion.t) > 999
+    np.testing.assert_allclose(motion.at(77.7), [np.sin(77.7), np.cos(77.7)], atol=1e-11)
