@@ -40,11 +40,13 @@ from .averaging import spectral_drift as spectral_drift
 from .averaging import wheel_input as wheel_input
 
 # control
+from .control import Certificate as Certificate
 from .control import ClosedLoop as ClosedLoop
 from .control import attitude_constants as attitude_constants
 from .control import attitude_law as attitude_law
 from .control import attitude_linearisation as attitude_linearisation
 from .control import attitude_region as attitude_region
+from .control import certificate as certificate
 from .control import check_compatibility as check_compatibility
 from .control import closed_loop as closed_loop
 from .control import critical_points as critical_points
@@ -54,6 +56,7 @@ from .control import error_names as error_names
 from .control import gains_for_response as gains_for_response
 from .control import generate_closed_loop as generate_closed_loop
 from .control import integral_law as integral_law
+from .control import invariance as invariance
 from .control import linear_loop as linear_loop
 from .control import reference as reference
 from .control import rigid_gains as rigid_gains

@@ -18,10 +18,11 @@ from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.errors import ExpressionError, IncompatibleError, InputError
 from lie_codegen.exact.exponential import MatrixExponential
+from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
-from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic
 from lie_codegen.kernel.dual import (
     DualArithmetic,
     PlainArithmetic,
@@ -42,7 +43,7 @@ class Compatibility:
 
     Attributes:
         compatible: whether (A2) holds.
-        exact: whether it was decided in rational numbers (else in 50 digits).
+        exact: whether it was decided in rational numbers (else in 50 digits, or in doubles where a logarithm is a loop).
         residual: the largest component of d_2 phi + P^T d_1 phi over the points; 0.0 exactly when compatible and exact.
         positive: whether phi vanishes on the diagonal with a positive definite Hessian there.
         hessian: (n, n) Hessian of phi(exp(x), 1) at x = 0: the stiffness that the linearised loop sees.
@@ -60,6 +61,8 @@ def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
     real = RealMatrices(error.group)
     rng = random.Random(seed)
     data = WeiNormanData(error.group)
+    if error.uses_log:
+        return _in_floats(error, real, data, rng)
     try:
         ops: PlainArithmetic = fraction_arithmetic()
         residual = _residual(ops, error, real, [(_rational(data, rng), _rational(data, rng)) for _ in range(_POINTS)])
@@ -74,6 +77,18 @@ def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
     return Compatibility(compatible, exact, float(residual), _positive(ops, error, real, X, hessian), hessian)
 
 
+def _in_floats(error: ErrorFunction, real: RealMatrices, data: WeiNormanData, rng: random.Random) -> Compatibility:
+    """With a logarithm, which may be a loop: in doubles, at places well within its cut."""
+    ops = FloatArithmetic()
+    places = [random_element(error.group, data, rng, 0.6) for _ in range(2 * _POINTS)]
+    read = GroupMatrices(ops, real).read
+    points = [(read(X), read(Y)) for X, Y in zip(places[::2], places[1::2], strict=True)]
+    residual, hessian = float(_residual(ops, error, real, points)), _hessian(ops, error, real)
+    size = max(1e-300, float(np.max(np.abs(np.array(hessian)))))
+    positive = _positive(ops, error, real, points[0][0], hessian, 1e-10 * size)
+    return Compatibility(residual < 1e-9 * size, False, residual, positive, hessian)
+
+
 def check_compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
     """The same, or an error.
 
@@ -86,7 +101,7 @@ def check_compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
     except ExpressionError as problem:
         raise type(problem)(f"error function {error.name} on {error.group.name}: {problem}") from None
     if not found.compatible:
-        how = "in rational numbers" if found.exact else f"in {_DIGITS} digits"
+        how = "in rational numbers" if found.exact else "in doubles" if error.uses_log else f"in {_DIGITS} digits"
         raise IncompatibleError(
             f"error function {error.name} on {error.group.name} and its transport map are not compatible (A2): "
             f"d_2 phi + P^T d_1 phi = {found.residual:.3g} at a random point, computed {how}, not 0; any phi of "
@@ -128,10 +143,15 @@ def _hessian(ops: Arithmetic, error: ErrorFunction, real: RealMatrices) -> tuple
 
 
 def _positive(
-    ops: PlainArithmetic, error: ErrorFunction, real: RealMatrices, X: Matrix, hessian: tuple[tuple[float, ...], ...]
+    ops: Arithmetic,
+    error: ErrorFunction,
+    real: RealMatrices,
+    X: Matrix,
+    hessian: tuple[tuple[float, ...], ...],
+    tolerance: Any = _TOLERANCE,
 ) -> bool:
     phi, gradient = ErrorDerivatives(ops, error, real, X, X).differential(1)
-    zero = all(abs(value) <= ops.constant(_TOLERANCE) for value in (phi, *gradient))
+    zero = all(abs(value) <= ops.constant(tolerance) for value in (phi, *gradient))
     values = np.linalg.eigvalsh((np.array(hessian) + np.array(hessian).T) / 2)
     return bool(zero and values[0] > 1e-12 * max(1e-300, abs(values[-1])))
 

@@ -63,7 +63,7 @@ class CriticalPoints(Saved, Sequence[CriticalPoint]):
             where phi is not proper.
         L_component: the least critical value on the boundary of the component of the reference (a mountain pass), L or above it.
         status: "complete" (the sum of (-1)^index is the Euler characteristic), "degenerate" (a critical manifold, which makes that test
-            void), "incomplete" (the sum disagrees: a point was missed), "unchecked" (the Euler characteristic of the group is not known),
+            void), "cut" (phi holds a logarithm, which is smooth up to its cut: L is at most the least of phi there), "incomplete" (the sum disagrees: a point was missed), "unchecked" (the Euler characteristic of the group is not known),
             or "not proper" (phi stays bounded on the way to infinity: no L).
         euler: the sum of (-1)^index, None where degenerate.
     """
@@ -119,6 +119,8 @@ def found_points(pair: ErrorFunction, seed: int = 0) -> CriticalPoints:
     """
     samples, rng = error_samples(pair), np.random.default_rng(seed)
     check_positive(pair, samples, rng)
+    if pair.uses_log:
+        return _up_to_the_cut(pair, samples, rng)
     proper = not _bounded_ray(samples, rng)
     chi = euler_characteristic(pair.group) if proper else None
     points: list[CriticalPoint] = [_reference(samples)]
@@ -138,6 +140,49 @@ def found_points(pair: ErrorFunction, seed: int = 0) -> CriticalPoints:
         "degenerate" if degenerate else "unchecked" if chi is None else "complete" if total == chi else "incomplete"
     )
     return CriticalPoints(tuple(points), L, _mountain_pass(samples, points), status, None if degenerate else total)
+
+
+def _up_to_the_cut(pair: ErrorFunction, samples: ErrorSamples, rng: np.random.Generator) -> CriticalPoints:
+    """The critical points where phi is smooth; none of those that lie on the cut itself."""
+    found = _search(samples, random_elements(pair.group, max(40, 14 * pair.group.dim), rng))
+    points = _merged([_reference(samples)], found, samples)
+    _check_zeros(pair, points)
+    L = min(cut_level(samples, rng), points[1].value if len(points) > 1 else float("inf"))
+    return CriticalPoints(tuple(points), L, L, "cut", None)
+
+
+def cut_level(samples: ErrorSamples, rng: np.random.Generator, count: int = 3000) -> float:
+    """The least of phi where a turn reaches 180 degrees: on rays exp(s x) just before |Im| of an eigenvalue of s hat(x) is pi.
+
+    Infinite on groups without turns.
+    """
+    group = samples.group
+
+    def level(x: Array) -> Array:
+        turn = np.max(np.abs(np.linalg.eigvals(group.hat(x)).imag), axis=-1)
+        ray = turn > 1e-3 * np.linalg.norm(x / basis_scales(group), axis=-1)
+        s = (np.pi - 1e-9) / np.where(ray, turn, 1)
+        with np.errstate(all="ignore"):
+            phi, _ = samples.first(expm(group.hat(s[:, None] * x)))
+        return np.where(ray & np.isfinite(phi), phi, np.inf)
+
+    x = rng.normal(size=(count, group.dim)) * basis_scales(group)
+    values = level(x)
+    order = np.argsort(values)[:8]
+    if not np.isfinite(values[order[0]]):
+        return float("inf")
+    best, least = x[order], values[order]
+    spread = 0.3
+    while spread > 1e-8:
+        moved = best[:, None] + spread * np.linalg.norm(best, axis=1)[:, None, None] * rng.normal(
+            size=(8, 40, group.dim)
+        ) * basis_scales(group) / np.linalg.norm(basis_scales(group))
+        tried = level(moved.reshape(-1, group.dim)).reshape(8, 40)
+        first = np.argmin(tried, axis=1)
+        better = tried[np.arange(8), first] < least
+        best[better], least[better] = moved[np.arange(8), first][better], tried[np.arange(8), first][better]
+        spread *= 0.75 if not np.any(better) else 0.97
+    return float(np.min(least))
 
 
 def check_positive(pair: ErrorFunction, samples: ErrorSamples, rng: np.random.Generator) -> None:

@@ -4,6 +4,9 @@
     so<n>_left    tr(K_p (1 - R R_d^T))/2, nu = xi_d
     se<n>_1..6    the rows of Table 1 with K_1 (attitude) and K_2 (position); n = 2 or 3 and above
     frobenius     k_p |X_d^-1 X - 1|^2/2 on any matrix group, nu = Ad_{X^-1 X_d} xi_d
+    geodesic      x^T K_p x/2, x = log(X_d^-1 X), on any matrix group, nu = Ad_{X^-1 X_d} xi_d; on SO(n) and SE(n) also so<n>_geodesic and
+                  se<n>_geodesic. d phi = rjac_inv(x)^T K_p x, which is K_p x for K_p = k 1 on SO(3) alone: the force -K_p x of a matrix
+                  K_p is no gradient. Smooth up to the cut, where a turn reaches 180 degrees.
 
 Row 5 is printed with (R + R_d)(p - p_d), which is not compatible with (1, 0); the pair phi_3(g g_d^-1) is
 (R + R_d)(R^T p - R_d^T p_d), and that is used.
@@ -12,6 +15,7 @@ Row 5 is printed with (R + R_d)(p - p_d), which is not compatible with (1, 0); t
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -23,6 +27,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.definition import record_factory
 
 Gains = Mapping[str, Any]
@@ -38,7 +43,7 @@ _ROWS = {
 
 
 def error_names(group: GroupLike) -> tuple[str, ...]:
-    """The names that `catalogue_error` knows for a group."""
+    """The names of Bullo and Murray's pairs that `catalogue_error` knows for a group; it knows "geodesic" on every group besides."""
     group = as_group(group, "error_names")
     names = ["frobenius"]
     kind = _kind(group)
@@ -49,6 +54,12 @@ def error_names(group: GroupLike) -> tuple[str, ...]:
     return tuple(names)
 
 
+def _geodesic_names(group: MatrixGroup) -> tuple[str, ...]:
+    """Of the pair of the logarithm, whose gain is a matrix on the algebra."""
+    kind = _kind(group)
+    return ("geodesic", *([f"{kind}{group.degree - (kind == 'se')}_geodesic"] if kind else []))
+
+
 @record_factory()
 def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
     """A pair by name.
@@ -56,18 +67,20 @@ def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunctio
     Args:
         group: SO(n), SE(n), or any group for "frobenius".
         name: see the module.
-        gains: K_p for SO(n); K_1 and K_2 for SE(n); k_p for "frobenius". A number, a diagonal or a matrix.
+        gains: K_p for SO(n) and "geodesic"; K_1 and K_2 for SE(n); k_p for "frobenius". A number, a diagonal or a matrix.
 
     Raises:
         InputError: no such pair on this group, a gain is missing, or it is not positive as it must be.
     """
-    known = error_names(group)
+    known = (*error_names(group), *_geodesic_names(group))
     if name not in known:
         close = difflib.get_close_matches(str(name), known, n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
         raise InputError(f"no error function {name!r} on {group.name}; known there: {', '.join(known)}{hint}")
     if name == "frobenius":
         return _frobenius(group, gains)
+    if name.endswith("geodesic"):
+        return _geodesic(group, name, gains)
     matched = re.fullmatch(r"(so|se)\d+_(\w+)", name)
     variant = matched[2] if matched else ""
     return _rotations(group, name, variant, gains) if variant in ("right", "left") else _motions(group, variant, gains)
@@ -131,6 +144,22 @@ def _frobenius(group: MatrixGroup, gains: Gains) -> ErrorFunction:
         "frobenius", group, k * sp.Add(*[entry**2 for entry in error.flat()]) / 2, "right",
         description="sum of squares of X_d^-1 X - 1; left-invariant",
     )  # fmt: skip
+
+
+def _geodesic(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
+    K = positive_matrix(gain(gains, "K_p", f"the error function {name}"), group.dim, "K_p")
+    phi = _square(K, sp.Matrix(ErrorSymbols(group).log_right)) / 2
+    least = None
+    if RealMatrices(group).rigid is not None and group.dim == 3:
+        least = float(eigenvalues(K)[0]) * math.pi**2 / 2  # phi on the cut, |x| = pi
+    return ErrorFunction(
+        name,
+        group,
+        phi,
+        "right",
+        constant=least,
+        description="x^T K_p x/2, x = log(X_d^-1 X); left-invariant, up to the cut",
+    )
 
 
 def _rotations(group: MatrixGroup, name: str, side: str, gains: Gains) -> ErrorFunction:

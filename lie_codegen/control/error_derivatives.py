@@ -13,10 +13,13 @@ from collections.abc import Sequence
 import sympy as sp
 
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.exponential import jacobian
+from lie_codegen.groups.maps.log_routine import closed_log, log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
+from lie_codegen.kernel.dual import DualArithmetic, split, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Matrix, Vector, bracket, matmul, matvec, minus, negative
 
@@ -94,8 +97,21 @@ class ErrorDerivatives:
         return ExpressionEvaluator(self.dual, self._values(X, Xi, Xd, Xdi))
 
     def _values(self, X: Matrix, Xi: Matrix, Xd: Matrix, Xdi: Matrix) -> dict[sp.Symbol, Scalar]:
-        symbols = ErrorSymbols(self.real.group).matrices
+        names = ErrorSymbols(self.real.group)
+        symbols = names.matrices
         values: dict[sp.Symbol, Scalar] = {}
+        if self.error.uses_log:
+            for coordinates, E in ((names.log_right, (Xdi, X)), (names.log_left, (X, Xdi))):
+                if any(
+                    expression.has(*coordinates)
+                    for expression in (self.error.phi, self.error.tau, self.error.P)
+                    if expression is not None
+                ):
+                    values.update(
+                        zip(
+                            coordinates, logarithm(self.dual, GroupDerivation(self.real.group), matmul(*E)), strict=True
+                        )
+                    )
         for prefix, numbers in (("X", X), ("Xi", Xi), ("Xd", Xd), ("Xdi", Xdi)):
             matrix = symbols[prefix]
             for i, row in enumerate(numbers):
@@ -117,3 +133,25 @@ class ErrorDerivatives:
             return group.Ad(tau, group.inverse(tau), xi_d)
         rows = self.error.P.tolist() if self.error.P is not None else []
         return matvec([[evaluate(entry) for entry in row] for row in rows], xi_d)
+
+
+def logarithm(ops: Arithmetic, data: GroupDerivation, E: Matrix) -> Vector:
+    """log(E), and its derivatives by D log(E)[E hat v] = rjac_inv(log E) v: exact on every branch, at the identity too."""
+    group = GroupMatrices(ops, data.real)
+    if not isinstance(ops, DualArithmetic):
+        # X and X_d are checked at the door of every kernel, so the closed form needs no guard of its own.
+        closed = closed_log(ops, data, group.write(E))
+        return log_coordinates(ops, data, group.write(E)) if closed is None else closed
+    level, size = ops.level, range(data.real.size)
+    plain = [[value_of(entry, level) for entry in row] for row in E]
+    x = logarithm(ops.ops, data, plain)
+    directions = sorted({a for row in E for entry in row for a in split(entry, level)[1]})
+    if not directions:
+        return x
+    below = GroupMatrices(ops.ops, data.real)
+    inverse, columns = below.inverse(plain), jacobian(ops.ops, data, x, "right", inverse=True)
+    rates = {}
+    for a in directions:
+        moved = [[tangent_of(E[i][j], a, level) for j in size] for i in size]
+        rates[a] = matvec(columns, below.vee(matmul(inverse, moved)))
+    return [ops.variable(x[k], {a: rate[k] for a, rate in rates.items()}) for k in range(data.group.dim)]

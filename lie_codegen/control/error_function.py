@@ -18,8 +18,9 @@ from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.definition import record_factory
-from lie_codegen.kernel.matrix_formula import matrix_formula, scalar_formula
+from lie_codegen.kernel.matrix_formula import MatrixLog, matrix_formula, scalar_formula
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
 NAMED_TRANSPORTS = ("right", "left")
@@ -75,10 +76,34 @@ class ErrorSymbols:
         return {prefix: self.matrix(prefix) for prefix in ("X", "Xd", "Xi", "Xdi")}
 
     @property
+    def log_right(self) -> tuple[sp.Symbol, ...]:
+        """(n) coordinates Lr1 .. Lrn of log(X_d^-1 X)."""
+        return tuple(sp.Symbol(f"Lr{k + 1}") for k in range(self.group.dim))
+
+    @property
+    def log_left(self) -> tuple[sp.Symbol, ...]:
+        """(n) coordinates Ll1 .. Lln of log(X X_d^-1)."""
+        return tuple(sp.Symbol(f"Ll{k + 1}") for k in range(self.group.dim))
+
+    @property
     def names(self) -> dict[str, sp.Symbol]:
         """Every symbol by its name, for the closed grammar."""
         symbols = {s for m in self.matrices.values() for entry in m.flat() for s in entry.free_symbols}
-        return {symbol.name: symbol for symbol in symbols}
+        return {symbol.name: symbol for symbol in (*symbols, *self.log_right, *self.log_left)}
+
+    @property
+    def logs(self) -> tuple[MatrixLog, ...]:
+        """The products whose logarithm a text may take; on orthogonal groups the transpose of X_d is its inverse."""
+        basis = RealMatrices(self.group).basis
+        products = [(self.X_d_inverse * self.X, self.log_right), (self.X * self.X_d_inverse, self.log_left)]
+        if all(matrix == -matrix.T for matrix in basis):
+            products += [(self.X_d.T * self.X, self.log_right), (self.X * self.X_d.T, self.log_left)]
+        zero = sp.zeros(*basis[0].shape)
+        return tuple(
+            MatrixLog(sp.ImmutableMatrix(product), sp.ImmutableMatrix(sum((x * A for x, A in zip(names, basis, strict=True)), zero)),
+                      sp.ImmutableMatrix(names))
+            for product, names in products
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -105,6 +130,13 @@ class ErrorFunction:
     constant: float | None = None
     description: str = field(default="", compare=False)
 
+    @property
+    def uses_log(self) -> bool:
+        """Whether phi or the transport holds a logarithm: then it is smooth up to the cut alone, where a turn reaches 180 degrees."""
+        symbols = ErrorSymbols(self.group)
+        used = set().union(*(each.free_symbols for each in (self.phi, self.tau, self.P) if each is not None))
+        return not used.isdisjoint({*symbols.log_right, *symbols.log_left})
+
 
 @record_factory(group=as_group)
 def error_function(
@@ -121,7 +153,8 @@ def error_function(
     Args:
         group: any matrix group.
         phi: a SymPy expression in `ErrorSymbols`, or a text: entries as X11 and Xd12, or matrices as in
-            "tr(K*(1 - Xd^-1*X))/2" (names X, Xd, ^-1, ' for the transpose, tr, norm2 for the sum of squares).
+            "tr(K*(1 - Xd^-1*X))/2" (names X, Xd, ^-1, ' for the transpose, tr, norm2 for the sum of squares, log(Xd^-1*X) and
+            log(X*Xd^-1), matrices of the algebra, and vee of these, (n, 1)).
         transport: "right", "left", {"tau": matrix or text} for nu = Ad_tau xi_d, or {"P": n x n rows} for nu = P xi_d.
         parameters: numbers and matrices by the names that the texts use.
         constant: L of (A1) if you know it; then the region of attraction is reported.
@@ -155,12 +188,26 @@ def _parameters(parameters: Mapping[str, Any], symbols: ErrorSymbols) -> dict[st
 
 def _phi(phi: Any, symbols: ErrorSymbols, values: Mapping[str, Any]) -> sp.Expr:
     if isinstance(phi, str):
-        return scalar_formula(phi, symbols.matrices, symbols.names, values)
+        return _smooth(scalar_formula(phi, symbols.matrices, symbols.names, values, logs=symbols.logs))
     if not isinstance(phi, sp.Expr):
         raise InputError(f"phi must be a text or a SymPy expression, got {type(phi).__name__}")
     expression = phi.subs({sp.Symbol(key): value for key, value in values.items() if isinstance(value, sp.Expr)})
     _check_symbols("phi", expression.free_symbols, symbols)
-    return expression
+    return _smooth(expression)
+
+
+def _smooth(phi: sp.Expr) -> sp.Expr:
+    """Refuses acos: at the reference its slope is infinite and half of its digits are lost, and so of acos(...)^2.
+
+    Raises:
+        InputError: naming what to write instead.
+    """
+    if phi.has(sp.acos):
+        raise InputError(
+            "phi holds acos, whose slope is infinite at the reference: for the squared angle give error='so3_geodesic' (on any group "
+            "'geodesic'), or norm2(log(Xd^-1*X)) in a formula"
+        )
+    return phi
 
 
 def _transport(
@@ -180,7 +227,7 @@ def _transport(
 
 def _matrix(what: str, rows: Any, symbols: ErrorSymbols, values: Mapping[str, Any], size: int) -> sp.ImmutableMatrix:
     if isinstance(rows, str):
-        matrix = matrix_formula(rows, symbols.matrices, symbols.names, values)
+        matrix = matrix_formula(rows, symbols.matrices, symbols.names, values, logs=symbols.logs)
     elif isinstance(rows, sp.MatrixBase):
         matrix = sp.ImmutableMatrix(rows)
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -42,49 +44,85 @@ class Samples:
     hessian: Array
 
 
+class _Batch:
+    """A CasADi Function over N columns at once, without copies: called a thousand times with a handful of columns by a search."""
+
+    def __init__(self, function: Any) -> None:
+        self.function = function
+        self.opened: dict[int, Any] = {}
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """(N, size) inputs -> (N, size) outputs."""
+        count = len(arguments[0])
+        if count not in self.opened:
+            whole = self.function.map(count)
+            # CasADi stores by columns: the columns of (size, N) are the rows of (N, size).
+            given = [np.empty((count, self.function.size1_in(i))) for i in range(self.function.n_in())]
+            made = [np.empty((count, self.function.size1_out(i))) for i in range(self.function.n_out())]
+            buffer, evaluate = whole.buffer()
+            for place, array in enumerate(given):
+                buffer.set_arg(place, cast(Any, memoryview)(array))
+            for place, array in enumerate(made):
+                buffer.set_res(place, cast(Any, memoryview)(array))
+            self.opened[count] = whole, buffer, evaluate, given, made
+        *_, evaluate, given, made = self.opened[count]
+        for array, values in zip(given, arguments, strict=True):
+            array[...] = values
+        evaluate()
+        return [array.copy() for array in made]
+
+
 class ErrorSamples:
     """One pair, its formulas derived once."""
 
     def __init__(self, pair: ErrorFunction) -> None:
         self.pair, self.group = pair, pair.group
         self.real = RealMatrices(pair.group)
-        self._first: Any = None
-        self._second: Any = None
-        self._transport: Any = None
+        self._first: _Batch | None = None
+        self._second: _Batch | None = None
+        self._transport: _Batch | None = None
+        self._moved: _Batch | None = None
+        derivation = GroupDerivation(pair.group)
+        if derivation.matrix_pattern is not None:
+            self._moved = _Batch(function_of(_move_kernel(derivation)))
 
     def at(self, X: Array, X_d: Array | None = None) -> Samples:
         """phi and its derivatives at (N, d, d) configurations, for one reference each; the identity if not given."""
         if self._second is None:
-            self._second = function_of(self._kernel())
+            self._second = _Batch(function_of(self._kernel()))
         n = self.group.dim
-        phi, slope, hessian = (each.full().T for each in self._second(*self._flat(X, X_d)))
+        phi, slope, hessian = self._second(*self._flat(X, X_d))
         return Samples(phi[:, 0], slope, hessian.reshape(-1, n, n))
 
     def first(self, X: Array, X_d: Array | None = None) -> tuple[Array, Array]:
         """phi and slope alone, whose formulas are found sooner."""
         if self._first is None:
-            self._first = function_of(self._first_kernel())
-        phi, slope = (each.full().T for each in self._first(*self._flat(X, X_d)))
+            self._first = _Batch(function_of(self._first_kernel()))
+        phi, slope = self._first(*self._flat(X, X_d))
         return phi[:, 0], slope
 
     def transport(self, X: Array, X_d: Array | None = None) -> tuple[Array, Array]:
         """P, (N, n, n), and its derivatives along the basis at X_d fixed: rates[:, a] = A_a P, (N, n, n, n)."""
         if self._transport is None:
-            self._transport = function_of(self._transport_kernel())
+            self._transport = _Batch(function_of(self._transport_kernel()))
         n = self.group.dim
-        P, rates = (each.full().T for each in self._transport(*self._flat(X, X_d)))
+        P, rates = self._transport(*self._flat(X, X_d))
         return P.reshape(-1, n, n), rates.reshape(-1, n, n, n)
 
     def moved(self, X: Array, x: Array) -> Array:
         """X exp(hat x), (N, d, d)."""
-        return np.asarray(X @ expm(self.group.hat(x)))
+        if self._moved is None:
+            return np.asarray(X @ expm(self.group.hat(x)))
+        kind = self.group.basis.dtype
+        [moved] = self._moved(np.ascontiguousarray(X, dtype=kind).view(float).reshape(len(x), -1), x)
+        return moved.view(kind).reshape(len(x), self.group.degree, self.group.degree)
 
     def _flat(self, X: Array, X_d: Array | None) -> tuple[Array, Array]:
         d = self.group.degree
-        kind = complex if self.group.is_complex else float
+        kind = self.group.basis.dtype
         Y = np.broadcast_to(np.eye(d), X.shape) if X_d is None else np.broadcast_to(X_d, X.shape)
         rows = [np.ascontiguousarray(each, dtype=kind).view(float).reshape(len(X), -1) for each in (X, Y)]
-        return rows[0].T, rows[1].T
+        return rows[0], rows[1]
 
     def _read(self, ops: Arithmetic, X: Any, X_d: Any) -> tuple[Matrix, Matrix]:
         read = GroupMatrices(ops, self.real).read
@@ -137,6 +175,16 @@ class ErrorSamples:
 
     def _ports(self) -> tuple[Port, ...]:
         return matrix_port(self.group, "X"), matrix_port(self.group, "X_d")
+
+
+def _move_kernel(derivation: GroupDerivation) -> Kernel:
+    group = derivation.group
+
+    def body(ops: Arithmetic, X: Any, x: Any) -> tuple[Any, ...]:
+        return (matmul(X, exp_matrix(ops, derivation, x)),)
+
+    inputs = (matrix_port(group, "X"), Port("x", (group.dim,)))
+    return Kernel("moved_sample", group.name, inputs, (matrix_port(group, "X_next"),), body)
 
 
 @lru_cache(maxsize=32)

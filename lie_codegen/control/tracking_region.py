@@ -109,7 +109,7 @@ def _region(pair: ErrorFunction, W: float) -> TrackingRegion:
     bound, how = pair.constant, "convergence is proved"
     if is_claimed(pair):
         found = check_constant(pair)
-        if found.status not in ("complete", "degenerate"):
+        if found.status not in ("complete", "degenerate", "cut"):
             words = f"L = {bound:.6g} of {pair.name} lies below all critical points found ({found.status}): nothing is proved"
             return TrackingRegion(W, bound, None, words)
         how = f"convergence follows, as L lies below the critical points of phi ({found.status})"

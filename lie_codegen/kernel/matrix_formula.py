@@ -7,15 +7,16 @@
     postfix:= atom "'"*                     (transpose)
     atom   := number | name | function '(' sum ')' | '(' sum ')'
 
-tr is the trace, norm2 the sum of squares of all entries (of a number its square), skew(A) = (A - A')/2; a number standing where a matrix is
-needed is that multiple of the identity. X^-1 and Xd^-1 are known; nothing else can be inverted. The text is data,
+tr is the trace, norm2 the sum of squares of all entries (of a number its square), skew(A) = (A - A')/2; log of a matrix is known for
+the products that the caller names, and vee of such a log is its (n, 1) coordinates; a number standing where a matrix is needed is that
+multiple of the identity. X^-1 and Xd^-1 are known; nothing else can be inverted. The text is data,
 never evaluated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -28,6 +29,14 @@ _MAX_EXPONENT = 16
 Value = Any  # sp.Expr or sp.ImmutableMatrix
 
 
+class MatrixLog(NamedTuple):
+    """A product of matrices, its logarithm as a matrix of symbols, and the coordinates of that."""
+
+    product: sp.ImmutableMatrix
+    matrix: sp.ImmutableMatrix
+    coordinates: sp.ImmutableMatrix
+
+
 def formula(
     text: str,
     matrices: Mapping[str, sp.ImmutableMatrix],
@@ -35,13 +44,14 @@ def formula(
     values: Mapping[str, Value],
     *,
     hermitian: bool = False,
+    logs: Sequence[MatrixLog] = (),
 ) -> Value:
     """What a text denotes, a scalar or a matrix; with `hermitian` norm2 sums the squared moduli of complex entries.
 
     Raises:
         ExpressionError: outside the grammar, an unknown name, or shapes that do not fit.
     """
-    return _Parser(text, matrices, names, values, hermitian=hermitian).parse()
+    return _Parser(text, matrices, names, values, hermitian=hermitian, logs=logs).parse()
 
 
 def scalar_formula(
@@ -51,13 +61,14 @@ def scalar_formula(
     values: Mapping[str, Value],
     *,
     hermitian: bool = False,
+    logs: Sequence[MatrixLog] = (),
 ) -> sp.Expr:
     """The scalar a text denotes.
 
     Raises:
         ExpressionError: outside the grammar, an unknown name, shapes that do not fit, or a matrix as the result.
     """
-    value = formula(text, matrices, names, values, hermitian=hermitian)
+    value = formula(text, matrices, names, values, hermitian=hermitian, logs=logs)
     if isinstance(value, sp.MatrixBase):
         if value.shape == (1, 1):
             return value[0, 0]
@@ -66,14 +77,19 @@ def scalar_formula(
 
 
 def matrix_formula(
-    text: str, matrices: Mapping[str, sp.ImmutableMatrix], names: Mapping[str, sp.Expr], values: Mapping[str, Value]
+    text: str,
+    matrices: Mapping[str, sp.ImmutableMatrix],
+    names: Mapping[str, sp.Expr],
+    values: Mapping[str, Value],
+    *,
+    logs: Sequence[MatrixLog] = (),
 ) -> sp.ImmutableMatrix:
     """The matrix a text denotes.
 
     Raises:
         ExpressionError: outside the grammar, or a scalar as the result.
     """
-    value = _Parser(text, matrices, names, values).parse()
+    value = _Parser(text, matrices, names, values, logs=logs).parse()
     if not isinstance(value, sp.MatrixBase):
         raise ExpressionError(f"{text!r} is a number, not a matrix")
     return sp.ImmutableMatrix(value)
@@ -90,9 +106,10 @@ class _Parser(TokenStream):
         values: Mapping[str, Any],
         *,
         hermitian: bool = False,
+        logs: Sequence[MatrixLog] = (),
     ) -> None:
         super().__init__(text, "'")
-        self.hermitian = hermitian
+        self.hermitian, self.logs = hermitian, logs
         self.matrices = matrices
         self.values = sorted(values)
         self.names: dict[str, Value] = {**names, "pi": sp.pi, **values}
@@ -219,6 +236,8 @@ class _Parser(TokenStream):
             if argument.rows != argument.cols:
                 raise self.error(f"{token.text} takes a square matrix", token)
             return argument.trace() if token.text == "tr" else (argument - argument.T) / 2
+        if token.text in ("log", "vee") and isinstance(argument, sp.MatrixBase):
+            return self.logarithm(token, argument)
         function = FORMULA_FUNCTIONS.get(token.text)
         if function is None or token.text == "atan2":
             raise self.error(
@@ -227,3 +246,13 @@ class _Parser(TokenStream):
         if isinstance(argument, sp.MatrixBase):
             raise self.error(f"{token.text} takes a number, not a matrix", token)
         return function(argument)
+
+    def logarithm(self, token: Token, argument: sp.MatrixBase) -> Value:
+        """log of a product that the caller knows, or vee of such a log."""
+        for each in self.logs:
+            if token.text == "log" and argument == each.product:
+                return each.matrix
+            if token.text == "vee" and argument == each.matrix:
+                return each.coordinates
+        what = "log takes Xd^-1*X or X*Xd^-1" if token.text == "log" else "vee takes a log of these: vee(log(Xd^-1*X))"
+        raise self.error(f"of matrices {what}", token)

@@ -68,6 +68,13 @@ def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence
     return [ops.where(on_group, closed, value) for closed, value in zip(x, checked, strict=True)]
 
 
+def closed_log(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector | None:
+    """The closed form alone, for an X that is known to be on the group; None where there is none."""
+    if not data.log_structure.is_closed:
+        return None
+    return _whole(ops, data, candidate(ops, data, [list(row) for row in X]))
+
+
 def _whole(ops: Arithmetic, data: GroupDerivation, x: Vector) -> Vector:
     """x, NaN in all of its components where one block has no logarithm."""
     partial = {"scale", "real2", "complex2"} | {block.kind for block in data.log_structure.blocks if block.scaled}

@@ -1,0 +1,322 @@
+"""lc.certificate: what is known of a tracking loop, with a status: the level, the rate, the overshoot.
+
+    W = phi + |xi_e|_I^2/2 <= level < L at the start  =>  W(t) <= k W(0) exp(-rate t)
+
+for the loop as Theorem 4.2 has it: the force of the law itself, all the time, on a body of that inertia. Bullo and Murray, CIT-CDS 97-003.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import eigh
+
+from lie_codegen.arrays import Array
+from lie_codegen.control.certificate_constants import Metric, hessian_bound, quadratic_bounds
+from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNumbers, overshoot_of
+from lie_codegen.control.claims import check_constant, is_claimed
+from lie_codegen.control.compatibility import check_compatibility
+from lie_codegen.control.critical_points import CriticalPoints, comes_home, found_points
+from lie_codegen.control.error_catalogue import as_error, gain
+from lie_codegen.control.error_function import ErrorFunction
+from lie_codegen.control.error_samples import error_samples
+from lie_codegen.control.interval_proof import proved_ratio
+from lie_codegen.control.invariance import invariance
+from lie_codegen.control.level_search import LevelSearch
+from lie_codegen.control.tracking_law import FEEDFORWARDS
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.maps.admission import admitted
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.definition import made_from
+from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.saved import Saved
+
+#: How far beyond the sampled value a bound is tried to be proved, in turn.
+_INFLATED = (1.01, 1.05)
+_LAW = "lie_codegen.control.tracking_law:tracking_law"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Saved):
+    """The constants of one loop on one level.
+
+    Attributes:
+        error, inertia, K_d, feedforward: the loop.
+        L: least critical value of phi other than at the reference, or the smaller constant that was claimed; (A1).
+        L_component: least value of a mountain pass out of the component of the reference; L or above it.
+        level: of W; every constant below holds on phi <= level.
+        speed: V, the largest |nu|_I of the transported reference velocity.
+        reach: largest entry of X_d and its inverse, where phi is not left-invariant; infinite where it is.
+        b_1, b_2: extreme values of phi/|d phi|^2 that were found.
+        b_1_proved, b_2_proved: bounds of these proved in interval arithmetic; NaN where there is no proof.
+        hessian: h = sup |H - d phi . nabla|_I.
+        transport: t = sup |nabla_Z X|_I over unit vectors.
+        epsilon, rate, k: of the pointwise certificate: W(t) <= k W(0) exp(-rate t).
+        theorem_epsilon, theorem_rate, theorem_k: of Theorem 4.2, by suprema one by one; NaN for other feedforwards than levi_civita.
+        P, Q: (2, 2) its matrices there, P the upper one; P_low proves that W is positive.
+        limit_rate: of W by the linearisation about a reference at rest: twice that of its slowest mode.
+        critical_points: of phi.
+        status: how each of these is known.
+    """
+
+    error: ErrorFunction
+    inertia: Array
+    K_d: Array
+    feedforward: str
+    L: float
+    L_component: float
+    level: float
+    speed: float
+    reach: float
+    b_1: float
+    b_2: float
+    b_1_proved: float
+    b_2_proved: float
+    hessian: float
+    transport: float
+    epsilon: float
+    rate: float
+    k: float
+    theorem_epsilon: float
+    theorem_rate: float
+    theorem_k: float
+    P: Array
+    P_low: Array
+    Q: Array
+    limit_rate: float
+    critical_points: CriticalPoints
+    status: str
+
+    @property
+    def group(self) -> MatrixGroup:
+        """The group."""
+        return self.error.group
+
+    def W(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> float:
+        """phi + |xi_e|_I^2/2 at a state.
+
+        Raises:
+            ShapeError, NotOnGroupError: an element or a velocity that is none.
+        """
+        return self._state(X, xi, X_d, xi_d).W
+
+    def inside(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> bool | None:
+        """Whether the certificate covers a loop that starts here, the reference staying within `speed` (and `reach`).
+
+        True: W <= level, and all conditions of Theorem 4.2 hold. False: W >= L, and no path downhill from X leads to the reference below a
+        mountain pass. None where nothing is known: between, for a faster or farther reference, or where critical points may be missing.
+
+        Raises:
+            ShapeError, NotOnGroupError: an element or a velocity that is none.
+        """
+        W, speed, far, E = self._state(X, xi, X_d, xi_d)
+        if speed > self.speed * (1 + 1e-9) + 1e-12 or far > self.reach * (1 + 1e-9):
+            return None
+        if self.critical_points.status not in ("complete", "degenerate", "cut"):
+            return None
+        if self.level >= W:
+            return True
+        if self.L > W or (self.L_component > W and comes_home(error_samples(self.error), E)):
+            return None
+        return False
+
+    def _state(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> _State:
+        return _state(self.error, self.inertia, X, xi, X_d, xi_d)
+
+
+class _State(NamedTuple):
+    """W, |nu|_I, the largest entry of X_d and X_d^-1, and a configuration as far from the identity as X is from X_d."""
+
+    W: float
+    speed: float
+    far: float
+    E: Array
+
+
+def _state(pair: ErrorFunction, inertia: Array, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> _State:
+    here, there = (admitted(pair.group, each, name).X for each, name in ((X, "X"), (X_d, "X_d")))
+    samples = error_samples(pair)
+    phi, _ = samples.first(here[None], there[None])
+    P, _ = samples.transport(here[None], there[None])
+    nu = P[0] @ _vector(xi_d, pair.group.dim, "xi_d")
+    error = _vector(xi, pair.group.dim, "xi") - nu
+    back = np.linalg.inv(there)
+    E = here @ back if pair.transport == "left" else back @ here
+    far = float(max(np.max(np.abs(there)), np.max(np.abs(back))))
+    return _State(float(phi[0] + error @ inertia @ error / 2), float(np.sqrt(nu @ inertia @ nu)), far, E)
+
+
+def _vector(value: ArrayLike, size: int, name: str) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.shape != (size,):
+        raise ShapeError(f"certificate: {name} has shape {array.shape}; give ({size},)")
+    return array
+
+
+def certificate(
+    group: GroupLike,
+    *,
+    inertia: Any = None,
+    error: Any = None,
+    gains: Mapping[str, Any] | None = None,
+    feedforward: str = "levi_civita",
+    law: Kernel | None = None,
+    level: float | None = None,
+    state: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike] | None = None,
+    speed: float = 0.0,
+    overshoot: float | None = None,
+    epsilon: float | None = None,
+    reach: float | None = None,
+    prove: bool = True,
+    limits: Any = None,
+    sample: float | None = None,
+    delay: Any = None,
+    seed: int = 0,
+) -> Certificate:
+    """The certificate of a tracking loop on a level of W.
+
+    Args:
+        group, inertia, error, gains, feedforward: as `tracking_law`; or `law`, which has them in its definition.
+        level: of W, below L; half of L if not given. b_1 grows without bound as it nears L.
+        state: (X, xi, X_d, xi_d) instead of a level: the level is W there.
+        speed: the largest |nu|_I of the reference velocity, transported.
+        overshoot: the largest k that is allowed: the rate is the best under it. Without it the best rate comes with a k of 5 to 8.
+        epsilon: of the cross term, instead of the best.
+        reach: the largest entry of X_d and its inverse, where phi is not left-invariant and the group not compact; 2 if not given.
+        prove: whether b_1 and b_2 are also proved in interval arithmetic where that is known how: phi = tr(K (1 - R_d^T R))/2 on SO(3).
+        limits, sample, delay: of a loop that clips, samples or delays its force: refused, as the proof is void there.
+        seed: of the search.
+
+    Raises:
+        InputError: as `tracking_law`; phi is negative, not proper, or its constant false; the level is not below L; a loop that no
+            certificate covers.
+    """
+    group = as_group(group, "certificate")
+    for name, value in (("limits", limits), ("sample", sample), ("delay", delay)):
+        if value is not None and value is not False:
+            raise InputError(
+                f"certificate: {name} = {value!r}: a force that is clipped, held or delayed voids the proof, and no certificate covers such a "
+                "loop; lc.loop_margins gives its margins, and gains whose force stays below the limits need no clipping"
+            )
+    if law is not None:
+        inertia, error, gains, feedforward = _of_law(law, group)
+    if inertia is None or error is None or gains is None:
+        raise InputError("certificate needs inertia, error and gains, or a law made by lc.tracking_law")
+    if feedforward not in FEEDFORWARDS:
+        raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
+    if not (np.isfinite(speed) and speed >= 0):
+        raise InputError(f"certificate: speed = {speed} must be a bound, 0 or more")
+    if overshoot is not None and not overshoot > 1:
+        raise InputError(f"certificate: overshoot = {overshoot} must be above 1: at t = 0 W itself is W(0)")
+    pair, n = as_error(group, error, gains), group.dim
+    body = as_floats(positive_matrix(inertia, n, "inertia"))
+    K_d = as_floats(positive_matrix(gain(gains, "K_d", "a tracking law"), n, "K_d"))
+    stiffness = np.array(check_compatibility(pair).hessian)
+    stiffness = (stiffness + stiffness.T) / 2
+    points = check_constant(pair) if is_claimed(pair) else found_points(pair)
+    if points.L is None or points.L_component is None:
+        raise InputError(
+            f"certificate: phi of {pair.name} on {group.name} stays bounded on the way to infinity: no level of W keeps the state near the "
+            "reference"
+        )
+    L = points.L if pair.constant is None else min(points.L, pair.constant)
+    metric, samples = Metric(group, body), error_samples(pair)
+    if state is not None:
+        now = _state(pair, body, *state)
+        level, speed = now.W, max(speed, now.speed)
+    level = _level(level, L, pair)
+    moving, bound = not invariance(pair).left, float("inf")
+    if moving:
+        bound = 2.0 if reach is None else float(reach)
+    search = LevelSearch(samples, body, level, 0.0, np.random.default_rng(seed), moving=moving, reach=bound)
+    b_1, b_2 = quadratic_bounds(search, metric, stiffness)
+    h, t = hessian_bound(search, metric), metric.turning()
+    damping = eigh(K_d, body, eigvals_only=True)
+    theorem = TheoremNumbers(b_1, b_2, h, t, float(damping[0]), float(damping[-1]), float(speed))
+    if speed:
+        search = LevelSearch(
+            samples, body, level, float(speed), np.random.default_rng(seed), moving=moving, reach=bound
+        )
+    pointwise = PointwiseRate(search, metric, K_d, feedforward, b_2)
+    if epsilon is None:
+        best = pointwise.best(overshoot)
+    else:
+        best = Rate(float(epsilon), pointwise.at(float(epsilon), starts=6), overshoot_of(float(epsilon), b_2))
+    stated = theorem.best(overshoot) if feedforward == "levi_civita" else Rate(float("nan"), float("nan"), float("nan"))
+    proved = _proved(pair, gains, body, level, b_1, b_2) if prove else (float("nan"), float("nan"))
+    slowest = np.linalg.eigvals(
+        np.block([[np.zeros((n, n)), np.eye(n)], [-metric.inverse @ stiffness, -metric.inverse @ K_d]])
+    )
+    return Certificate(
+        pair, body, K_d, feedforward, float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component), level, float(speed), bound, b_1, b_2, *proved, h, t,
+        best.epsilon, best.rate, best.k, stated.epsilon, stated.rate, stated.k, theorem.P(stated.epsilon), theorem.P(stated.epsilon, -1.0),
+        theorem.Q(stated.epsilon), float(-2 * np.max(slowest.real)), points, _status(pair, points, proved, len(search.places.X)),
+    )  # fmt: skip
+
+
+def _of_law(law: Kernel, group: MatrixGroup) -> tuple[Any, Any, Any, str]:
+    """What a tracking law was made from.
+
+    Raises:
+        InputError: another law, which no certificate covers; or one with numbers that are inputs.
+    """
+    definition = getattr(law, "definition", None)
+    if definition is None or definition["kind"] != _LAW:
+        kind = "a law of your own" if definition is None else str(definition["kind"]).partition(":")[2]
+        raise InputError(
+            f"certificate: {getattr(law, 'name', law)!r} is made by {kind}; a certificate covers lc.tracking_law alone: clipping, integral "
+            "action, adaptation and jumps are other loops"
+        )
+    given = {name: made_from(value) for name, value in definition["parameters"].items()}
+    if given["group"] != group:
+        raise InputError(f"certificate: the law is one of {given['group'].name}, not of {group.name}")
+    if given["tunable"] or "input" in (given["inertia"], *(v for v in given["gains"].values() if isinstance(v, str))):
+        raise InputError("certificate: the law's numbers are inputs: give inertia, error and gains instead")
+    return given["inertia"], given["error"], given["gains"], given["feedforward"]
+
+
+def _level(level: float | None, L: float, pair: ErrorFunction) -> float:
+    if level is None:
+        if not np.isfinite(L):
+            raise InputError(
+                f"certificate: phi of {pair.name} has no other critical point, so L is infinite: give level="
+            )
+        return L / 2
+    value = float(level)
+    if not 0 < value < L:
+        raise InputError(f"certificate: level = {value:g} must lie between 0 and L = {L:g}: at L b_1 is infinite")
+    return value
+
+
+def _proved(
+    pair: ErrorFunction, gains: Mapping[str, Any], inertia: Array, level: float, b_1: float, b_2: float
+) -> tuple[float, float]:
+    """Bounds near the sampled ones, each proved; NaN where none is."""
+    if pair.name != "so3_right" or is_claimed(pair):
+        return float("nan"), float("nan")
+    definition = getattr(pair, "definition", None)
+    given = definition["parameters"]["gains"] if definition is not None else gains
+    K = as_floats(attitude_gain(gain(given, "K_p", "the error function so3_right"), 3, "K_p"))
+    above = (f * b_1 for f in _INFLATED if proved_ratio(K, inertia, level, f * b_1, upper=True))
+    below = (b_2 / f for f in _INFLATED if proved_ratio(K, inertia, level, b_2 / f, upper=False))
+    return next(above, float("nan")), next(below, float("nan"))
+
+
+def _status(pair: ErrorFunction, points: CriticalPoints, proved: tuple[float, float], count: int) -> str:
+    if pair.uses_log:
+        known = "up to the cut locus, L the least of phi there"
+    elif not is_claimed(pair) and pair.constant is not None:
+        known = "L known"
+    else:
+        known = f"L from critical points ({points.status})"
+    if np.all(np.isfinite(proved)):
+        bounds = f"b_1 <= {proved[0]:.6g} and b_2 >= {proved[1]:.6g} proved in interval arithmetic"
+    else:
+        bounds = "b_1 and b_2 sampled"
+    return f"{known}; {bounds}; hessian and rates sampled ({count} places and their refinement)"
