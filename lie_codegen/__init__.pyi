@@ -58,6 +58,7 @@ from .control import generate_closed_loop as generate_closed_loop
 from .control import integral_law as integral_law
 from .control import invariance as invariance
 from .control import linear_loop as linear_loop
+from .control import read_law as read_law
 from .control import reference as reference
 from .control import rigid_gains as rigid_gains
 from .control import tracking_law as tracking_law

@@ -4,31 +4,67 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
+from lie_codegen.errors import InputError
 
 
 def generate(
     group: GroupName,
     out: Annotated[Path | None, typer.Option(help="Folder to write; ./GROUP by default.")] = None,
     real: Annotated[str, typer.Option(help="double, or float for processors without double.")] = "double",
+    steering: Annotated[
+        str | None,
+        typer.Option(help="Controls, comma-separated: a minimum-energy steering solver in the subfolder steering."),
+    ] = None,
+    law: Annotated[
+        list[Path] | None,
+        typer.Option(help="TOML file of a law (lie_codegen/control/README.md) that joins the package; repeatable."),
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            help="Plan that plan.save() or steer --save wrote: its controls join, with a program that flies them."
+        ),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="C identifier of the header, the source and the target.")] = None,
     json: Json = False,
 ) -> None:
-    """Generate the C package of a group: header, source, CMake, example, test vectors."""
+    """Generate the C package of a group, of its laws and plans: header, source, CMake, example, test vectors."""
     from lie_codegen.groups.build import generate as write
     from lie_codegen.groups.catalogue_load import group as load
 
     started = time.perf_counter()
     g = load(group)
-    folder = write(g, out or Path(g.name), real=real)
+    parts: list[Any] = [g]
+    if law:
+        from lie_codegen.control.law_file import read_law
+
+        parts += [read_law(path, g) for path in law]
+    if plan is not None:
+        parts.append(_plan_of(plan, g))
+    controls = None if steering is None else [label.strip() for label in steering.split(",")]
+    folder = write(parts if len(parts) > 1 else g, out or Path(g.name), real=real, steering=controls, name=name)
     seconds = time.perf_counter() - started
     files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
     text = f"wrote {folder} in {seconds:.2f} s: {', '.join(files)}"
     emit(text, {"folder": folder, "files": files, "seconds": seconds}, json)
+
+
+def _plan_of(path: Path, group: Any) -> Any:
+    from lie_codegen.kernel.saved import load
+    from lie_codegen.steering.plan import Plan
+
+    plan = load(path)
+    if not isinstance(plan, Plan):
+        raise InputError(f"--plan {path} holds a {type(plan).__name__}, no plan of lc.steer")
+    if plan.group != group:
+        raise InputError(f"--plan {path} is a plan on {plan.group.name}, not on {group.name}")
+    return plan
 
 
 def build(group: GroupName, json: Json = False) -> None:

@@ -10,6 +10,7 @@ import typer
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
 from lie_codegen.cli.steering_texts import limits_of, numbers, obstacle_ball, obstacle_cone, target_of, via_point
+from lie_codegen.errors import OutputFolderError
 
 _Optional = typer.Option
 _LIMITS = "one number, low:high, or label=either, comma-separated."
@@ -63,6 +64,9 @@ def steer(
     seed: Annotated[int | None, _Optional(help="Of direct: of the first guesses.")] = None,
     equation: Annotated[str | None, _Optional(help="Of direct: left (X' = X u^) or right (X' = u^ X).")] = None,
     picture: Annotated[Path | None, _Optional(help="File for a picture of the plan: png, svg or pdf.")] = None,
+    save: Annotated[
+        Path | None, _Optional(help="File for the plan (.npz), as lc.load and generate --plan read it.")
+    ] = None,
     samples: Annotated[int, _Optional(help="Number of control samples in the JSON object.")] = 101,
     json: Json = False,
 ) -> None:
@@ -123,4 +127,14 @@ def steer(
 
         data["picture"] = plot_plan(plan, picture, obstacles=obstacles).resolve()
         text += f"\npicture: {data['picture']}"
+    if save is not None:
+        data["saved"] = _saved(plan, save)
+        text += f"\nsaved: {data['saved']}"
     emit(text, data, json)
+
+
+def _saved(plan: Any, path: Path) -> Path:
+    try:
+        return Path(plan.save(path)).resolve()
+    except OSError as error:
+        raise OutputFolderError(f"--save {path}: {error.strerror or error}") from None

@@ -64,14 +64,24 @@ def render_package(
     checks = [
         (shown, _rows(kernel, each, target)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)
     ]
+    more = sorted(extra or {})
+    files = {
+        "sources": [f"src/{namespace}.c", *(path for path in more if path.startswith("src/") and path.endswith(".c"))],
+        "headers": [f"include/{namespace}.h", *(path for path in more if path.startswith("include/"))],
+        "programs": [
+            (path, stem if (stem := path.removesuffix(".c")).startswith(f"{namespace}_") else f"{namespace}_{stem}")
+            for path in more
+            if "/" not in path and path.endswith(".c")
+        ],
+    }
     tree = {
         f"include/{namespace}.h": render("header.h.jinja", package=view),
         f"src/{namespace}.c": render("source.c.jinja", package=view),
-        "CMakeLists.txt": render("CMakeLists.txt.jinja", package=view),
+        "CMakeLists.txt": render("CMakeLists.txt.jinja", package=view, **files),
         f"{namespace}Config.cmake.in": render("Config.cmake.in.jinja", package=view),
         "example.c": render("example.c.jinja", package=view, checks=checks, tolerance=repr(TOLERANCES[real])),
         "test_vectors.csv": render("test_vectors.csv.jinja", rows=_csv_rows(kernels, vectors)),
-        "README.md": render("README.md.jinja", package=view),
+        "README.md": render("README.md.jinja", package=view, **files),
         **(extra or {}),
     }
     return {**tree, "manifest.json": _manifest(view, kernels, tree)}

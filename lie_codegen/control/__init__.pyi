@@ -16,6 +16,7 @@ from .error_catalogue import error_names as error_names
 from .error_function import error_function as error_function
 from .integral_law import integral_law as integral_law
 from .invariance import invariance as invariance
+from .law_file import read_law as read_law
 from .linearisation import linear_loop as linear_loop
 from .linearisation import rigid_gains as rigid_gains
 from .reference_kernels import reference as reference

@@ -15,6 +15,8 @@ from lie_codegen.runtime.current_package import current_package, package_key, re
 from lie_codegen.runtime.library import Library, require_kernels
 
 if TYPE_CHECKING:
+    from lie_codegen.codegen.parts import HasParts, PackageParts
+    from lie_codegen.codegen.views import PackageMetadata
     from lie_codegen.groups.matrix_group import MatrixGroup
     from lie_codegen.kernel.kernel import Kernel
 
@@ -76,34 +78,40 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name
 
 
 def generate(
-    what: Buildable,
+    what: Buildable | HasParts | Sequence[MatrixGroup | Kernel | str | Path | HasParts],
     folder: str | Path,
     *,
     steering: Sequence[str | int] | Literal[True] | None = None,
     real: str = "double",
     name: str | None = None,
+    form: str | None = None,
 ) -> Path:
-    """The C package of a group, of kernels or of a controller of `lc.mpc`, written as a folder; returns its path.
+    """The C package of a group, of kernels, of a plan, of a closed loop or of a controller of `lc.mpc`, or of several of these;
+    written as a folder; returns its path.
+
+    A plan becomes <name>_plan.h and .c, its controls as a function of t, and <name>_plan_replay.c, which flies them and compares with
+    test vectors. A closed loop becomes its law with closed_loop.c, which runs it from the same start.
 
     Args:
-        what: as `build`; or a controller, whose package is the bounded solver with its model.
+        what: as `build`; or a plan; a closed loop; or a list of groups, kernels, plans and loops for one package. A controller is a
+            package by itself, the bounded solver with its model.
         folder: created if need be.
         steering: controls of a group, for a minimum-energy steering solver in the subfolder "steering", a C package by
             itself with its own example and test vectors; True for all components. The solver is in double.
         real: "double", or "float" for processors without double: arguments, constants and libm in single precision.
         name: C identifier of the header, the source and the CMake target; the namespaces if None. So two laws of one group,
             with names of their own, and the group's own package go into one program.
+        form: of a plan's controls: "table" (polynomials, piece by piece), "fourier", or the shorter of the two if None.
 
     What the folder holds is compared with what was last written there from the same definition: if it is current, nothing
     is derived or written.
 
     Raises:
-        InputError: as `build`; steering of kernels.
+        InputError: as `build`; steering without a group; a form that the plan has not.
         UncontrollableError: the controls of `steering` do not reach everything; says what is missing.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
     from lie_codegen.codegen.generate import generate as generate_package
-    from lie_codegen.codegen.views import PackageMetadata
     from lie_codegen.codegen.write import write_package
 
     render = getattr(what, "render_package", None)
@@ -112,28 +120,71 @@ def generate(
         if steering is not None:
             raise InputError("generate: steering needs a group, not a controller")
         return write_package(render(real=real), folder)
-    source = _known_by(what)
+    parted, plain = _split(what)
+    if form is not None and not parted:
+        raise InputError("generate: form says how the controls of a plan are stored, and no plan is given")
+    source = None if parted else _known_by(plain)
     controls = list(steering) if isinstance(steering, Sequence) and not isinstance(steering, str) else steering
     key = None if source is None else package_key([source, controls, real, name])
     if (current := current_package(key, folder)) is not None:
         return current
-    if isinstance(what, str | Path):
-        from lie_codegen.groups.catalogue_load import group as load
-
-        what = load(what)
-    group, kernels = _group_or_kernels(what)
-    if group is None:
-        if steering is not None:
-            raise InputError("generate: steering needs a group, not kernels")
-        written = generate_package(kernels, folder, namespace=_package_name(kernels, name), real=real)
-    else:
-        extra = _steering(group, steering) if steering is not None else {}
-        metadata = PackageMetadata(title=group.name, description=_about(group), labels=group.labels, units=group.units)
-        written = generate_package(
-            _kernels_of(group), folder, namespace=name or group.name, metadata=metadata, extra=extra, real=real
-        )
+    groups, kernels, parts = _gathered(plain, parted, name, real, form)
+    if steering is not None and len(groups) != 1:
+        raise InputError(f"generate: steering needs one group, and {len(groups)} are given")
+    files = {path: text for each in parts for path, text in each.files.items()}
+    extra = {**files, **(_steering(groups[0], steering) if steering is not None else {})}
+    alone = groups[0] if len(groups) == 1 and all(kernel.namespace == groups[0].name for kernel in kernels) else None
+    namespace = parts[0].namespace if parts and name is None else _package_name(kernels, name)
+    metadata = None if alone is None else _metadata(alone)
+    written = generate_package(kernels, folder, namespace=namespace, metadata=metadata, extra=extra, real=real)
     remember_package(key, written)
     return written
+
+
+def _split(what: Any) -> tuple[list[HasParts], Any]:
+    """What brings parts of its own, and the rest as it was given."""
+    from lie_codegen.codegen.parts import HasParts
+
+    if isinstance(what, HasParts):
+        return [what], []
+    if not isinstance(what, list | tuple):
+        return [], what
+    parted = [each for each in what if isinstance(each, HasParts)]
+    return parted, [each for each in what if not isinstance(each, HasParts)] if parted else what
+
+
+def _gathered(
+    plain: Any, parted: Sequence[HasParts], name: str | None, real: str, form: str | None
+) -> tuple[list[MatrixGroup], list[Kernel], list[PackageParts]]:
+    """The groups themselves, all kernels once, and the parts; files of two plans or loops bear numbers."""
+    from lie_codegen.groups.catalogue_load import group as load
+    from lie_codegen.groups.matrix_group import MatrixGroup
+
+    items = list(plain) if isinstance(plain, list | tuple) else [plain]
+    named = [load(each) if isinstance(each, str | Path) else each for each in items]
+    groups = [each for each in named if isinstance(each, MatrixGroup)]
+    kernels = list(_group_or_kernels(named)[1]) if named else []
+    own = [each.package_parts(name, real, form) for each in parted]
+    if own and name is None:
+        # one name for the whole: the includes of all programs are of one package
+        common = own[0].namespace
+        own = [each.package_parts(common, real, form) for each in parted] if len(own) > 1 else own
+    repeated = [
+        path for index, each in enumerate(own) for path in each.files if any(path in o.files for o in own[:index])
+    ]
+    if repeated:
+        raise InputError(
+            f"generate: several things bring {', '.join(sorted(set(repeated)))}; write them to folders of their own"
+        )
+    for each in own:
+        kernels += [kernel for kernel in each.kernels if kernel not in kernels]
+    return groups, kernels, own
+
+
+def _metadata(group: MatrixGroup) -> PackageMetadata:
+    from lie_codegen.codegen.views import PackageMetadata
+
+    return PackageMetadata(title=group.name, description=_about(group), labels=group.labels, units=group.units)
 
 
 def _known_by(what: Buildable) -> str | None:

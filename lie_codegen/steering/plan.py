@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,11 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved, json_value, table_text
 from lie_codegen.values import Value
 
+#: What writes a plan as C stands above this file, and is loaded when it is asked for.
+PACKAGE = "lie_codegen.steering.plan_package"
 #: Times beyond the ends, relative to the duration, that are rounding.
 _ROUNDING = 1e-9
 
@@ -300,6 +304,16 @@ class Plan(Saved):
         if path is not None:
             Path(path).write_text(text, encoding="utf-8")
         return text
+
+    def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:
+        """The controls as C with a program that flies them, as `lc.generate(plan, folder)` writes them.
+
+        Raises:
+            InputError: no such form, or "fourier" of controls that are no Fourier series over the duration.
+            ComputationError: the controls are not smooth between their breakpoints.
+        """
+        parts: PackageParts = import_module(PACKAGE).plan_parts(self, name, real, form or "auto")
+        return parts
 
     def inputs(self, t: ArrayLike) -> Array:
         """What each control does: (m,) at a time, (k, m) at (k,) times; u(t) = sum_i inputs_i b_i(t), without the drift."""

@@ -193,3 +193,27 @@ def test_manners_of_the_command_line(cli, tmp_path: Path) -> None:
     refused = cli("steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--picture", "plan.xyz")
     assert refused.returncode == 2
     assert len(refused.stderr.strip().splitlines()) == 1
+
+
+def test_generate_takes_laws_a_plan_and_a_steering_solver(cli, tmp_path: Path) -> None:
+    task = ("steer", "so3", "--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--method", "optimal")
+    assert cli(*task, "--save", "plan.npz").returncode == 0
+    Path("pd.toml").write_text('law = "attitude"\nkind = "pd"\ninertia = [1, 2, 3]\nk_p = 4\nk_d = 6\n')
+    done = cli(
+        "generate", "so3", "--law", "pd.toml", "--plan", "plan.npz", "--steering", "w1,w2", "--out", "out", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    files = set(json.loads(done.stdout)["files"])
+    assert {"src/so3.c", "src/so3_plan.c", "so3_plan_replay.c", "steering/example.c"} <= files
+    assert "so3_attitude_pd(" in Path("out/include/so3.h").read_text()
+    for arguments, words in (
+        (("se3", "--plan", "plan.npz"), "not on se3"),
+        (("so3", "--plan", "none.npz"), "none.npz"),
+        (("so3", "--law", "none.toml"), "cannot be read"),
+        (("so3", "--steering", "w9,w1"), "w9"),
+        ((*task[1:], "--save", "no/plan.npz"), "no/plan.npz"),
+    ):
+        done = cli(task[0] if arguments[-2] == "--save" else "generate", *arguments)
+        assert done.returncode == 2, arguments
+        assert words in done.stderr
+        assert done.stderr.count("\n") == 1
