@@ -49,8 +49,8 @@ class Backend(Protocol):
     def loop_address(self, *, many: bool) -> int:
         """Where the C of `scan` (`scan_batch`) is; 0 if there is none."""
 
-    def call_address(self) -> int:
-        """Where the C of `call` is, of pointers to inputs and outputs; 0 if there is none."""
+    def address(self, *, many: bool) -> int:
+        """Where the C of `call` (`batch`) is; 0 if there is none."""
 
 
 class _Workspace:
@@ -129,8 +129,8 @@ class CtypesBackend:
             return 0
         return ctypes.cast(self._scan_batch if many else self._scan, ctypes.c_void_p).value or 0
 
-    def call_address(self) -> int:
-        return ctypes.cast(self._call, ctypes.c_void_p).value or 0
+    def address(self, *, many: bool) -> int:
+        return ctypes.cast(self._batch if many else self._call, ctypes.c_void_p).value or 0
 
 
 class InterpretedBackend:
@@ -191,7 +191,7 @@ class InterpretedBackend:
     def loop_address(self, *, many: bool) -> int:
         return 0
 
-    def call_address(self) -> int:
+    def address(self, *, many: bool) -> int:
         return 0
 
 

@@ -81,7 +81,7 @@ class Field:
         if rate.inputs[self.places[0]].size != size:
             raise ShapeError(f"{rate.name}: {state} has {rate.inputs[self.places[0]].size} entries, not {size}")
         self.outputs = [np.zeros(port.shape) for port in rate.outputs]
-        self.address = rate.backend.call_address()
+        self.address = rate.backend.address(many=False)
 
     def __call__(self, t: float, y: Array) -> Array:
         """f(t, y), by Python."""

@@ -1,0 +1,92 @@
+"""A system on a product of groups and a vector space as the rate of one vector, for integrators that choose their steps.
+
+X_i' = X_i hat(xi_i(t, X, v)),   v' = a(t, X, v);   within a step X_i = X_i0 exp(Theta_i), y = (Theta_1, ..., Theta_m, v)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.linear import Vector, bracket
+
+#: B_2k / (2k)! for k = 1 .. 6. For |ad Theta| <= 1 the next term is 3e-11 of the first.
+_SERIES = (1 / 12, -1 / 720, 1 / 30240, -1 / 1209600, 1 / 47900160, -691 / 1307674368000)
+#: Up to this |hat(Theta)| the Taylor polynomial of a group without a closed exponential is exact to rounding.
+_TAYLOR_REACH = 0.25
+
+#: (t, elements, v) -> body velocities of the elements and the rate of v.
+Rates = Callable[[Scalar, list[Any], Vector], tuple[list[Vector], Vector]]
+
+
+class Move(Protocol):
+    """(ops, X, theta) -> X exp(hat(theta))."""
+
+    group: MatrixGroup
+
+    def __call__(self, ops: Arithmetic, X: Any, theta: Vector, /) -> Any: ...
+
+
+def dexp_inverse(ops: Arithmetic, group: MatrixGroup, theta: Vector, xi: Vector) -> Vector:
+    """Theta' of X = X_0 exp(Theta), X' = X hat(xi): xi + ad xi/2 + sum_k B_2k/(2k)! ad^2k xi, ad = [Theta, .].
+
+    The sign of ad/2 is that of X' = X hat(xi). Of rotations ad^3 = -s^2 |Theta|^2 ad, so two brackets are enough.
+    """
+    once = bracket(ops, group.algebra, theta, xi)
+    twice = bracket(ops, group.algebra, theta, once)
+    speed = rotation_rate(group)
+    if speed is not None:
+        x = -speed * speed * sum((a * a for a in theta[1:]), theta[0] * theta[0])
+        factor: Scalar = _SERIES[-1]
+        for coefficient in reversed(_SERIES[:-1]):
+            factor = coefficient + x * factor
+        return [e + a / 2 + factor * b for e, a, b in zip(xi, once, twice, strict=True)]
+    total = [e + a / 2 + _SERIES[0] * b for e, a, b in zip(xi, once, twice, strict=True)]
+    for coefficient in _SERIES[1:]:
+        twice = bracket(ops, group.algebra, theta, bracket(ops, group.algebra, theta, twice))
+        total = [e + coefficient * b for e, b in zip(total, twice, strict=True)]
+    return total
+
+
+def rotation_rate(group: MatrixGroup) -> float | None:
+    """s where [A_1, A_2] = s A_3 and so on round, as on SO(3) and SU(2); None elsewhere."""
+    c = group.algebra.structure_constants
+    if group.dim != 3:
+        return None
+    turn = np.zeros((3, 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        turn[i, j, k], turn[j, i, k] = c[0, 1, 2], -c[0, 1, 2]
+    return float(c[0, 1, 2]) if c[0, 1, 2] != 0 and np.array_equal(c, turn) else None
+
+
+def reach_of(group: MatrixGroup, *, closed: bool) -> float:
+    """|Theta| up to which the series above and the exponential hold.
+
+    Args:
+        group: the group.
+        closed: whether its exponential is one in closed form.
+    """
+    c = group.algebra.structure_constants
+    # |ad|_F <= the largest singular value times |Theta|; eigenvalues of ad come in pairs, so two share it.
+    steepest = float(np.linalg.norm(c.reshape(group.dim, -1), 2)) / np.sqrt(2)
+    largest = float(np.linalg.norm(np.asarray(group.basis).reshape(group.dim, -1), 2))
+    by_series = 1 / steepest if steepest > 0 else np.inf
+    return float(min(by_series, np.inf if closed else _TAYLOR_REACH / largest, 1e6))
+
+
+def product_rate(
+    ops: Arithmetic, moves: Sequence[Move], elements: Sequence[Any], y: Vector, rates: Rates, t: Scalar
+) -> Vector:
+    """y' of y = (Theta_1, ..., v), from the elements where the step began."""
+    thetas, place = [], 0
+    for move in moves:
+        thetas.append(list(y[place : place + move.group.dim]))
+        place += move.group.dim
+    now = [move(ops, X, theta) for move, X, theta in zip(moves, elements, thetas, strict=True)]
+    velocities, slope = rates(t, now, list(y[place:]))
+    turned = [dexp_inverse(ops, m.group, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)]
+    return [x for each in turned for x in each] + list(slope)

@@ -1,0 +1,262 @@
+/*
+ * X' = X hat(xi), y' = F(t, X, y) on a group by the explicit pair 8(5,3), to a tolerance.
+ *
+ * y holds Theta (the first `group` entries), then xi, then what else there is. Within a step X = X_0 exp(Theta), Theta' = dexp^-1 xi, so
+ * that the pair sees a vector; after it X_0 <- X_0 exp(Theta), Theta = 0. F and the product are kernels, given by address:
+ *     rate(X_0, y, t, numbers...) -> y'        move(X_0, Theta) -> X_0 exp(Theta)
+ * Several members go with one step size: the one that needs the shortest decides.
+ *
+ * States are wanted at given times. A step ends there if two or more such times lie in it; a single one is reached by a step
+ * of its own beside, since the interpolant of the pair errs a hundred times more than its steps.
+ */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "pair853_table.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT
+#endif
+
+enum { MOST_NUMBERS = 32, DONE = 0, FULL = 1, STUCK = 2, LOST = 3 };
+
+typedef void (*Call)(const double *const *in, double *const *out);
+typedef void (*Batch)(ptrdiff_t count, const double *const *in, const ptrdiff_t *strides, double *const *out);
+
+typedef struct {
+    Call rate, move;                /* of one member; NULL where there are several */
+    Batch rate_batch, move_batch;
+    ptrdiff_t members, packed, group, size, numbers;
+    const double *const *number;    /* inputs of the rate beside X, y and t */
+    const ptrdiff_t *number_stride; /* in doubles from member to member */
+    double t, t_low, h, rtol, atol, reach, longest; /* |Theta| stays within reach; h at most longest (the step to begin with, or 0) */
+    double *X, *y;                  /* members x packed, members x size */
+    const double *times;            /* that are wanted, all after t at the start */
+    ptrdiff_t count, next, row;     /* of them; those that are done; members of all rows of the outputs */
+    double *X_out, *y_out;          /* count x row x packed, count x row x size */
+    double *knot_t, *knot_h, *knot_X, *knot_y; /* accepted steps, of one member; NULL if not wanted */
+    ptrdiff_t room, knots;
+    double *work;                   /* members x (size x (STAGES + 3) + 2 packed + group) */
+    ptrdiff_t steps, rejected, evaluations;
+} Pair;
+
+static void rates(Pair *p, const double *X, const double *y, double t, double *to)
+{
+    const double *in[3 + MOST_NUMBERS];
+    double *out[1];
+    in[0] = X;
+    in[1] = y;
+    in[2] = &t;
+    out[0] = to;
+    for (ptrdiff_t k = 0; k < p->numbers; ++k) {
+        in[3 + k] = p->number[k];
+    }
+    ++p->evaluations;
+    if (p->members == 1 && p->rate) {
+        p->rate(in, out);
+    } else {
+        ptrdiff_t strides[3 + MOST_NUMBERS] = {p->packed, p->size, 0};
+        for (ptrdiff_t k = 0; k < p->numbers; ++k) {
+            strides[3 + k] = p->number_stride[k];
+        }
+        p->rate_batch(p->members, in, strides, out);
+    }
+}
+
+/* X <- X exp(Theta), Theta = 0. */
+static void settle(Pair *p, double *X, double *y, double *scratch)
+{
+    double *theta = p->work + p->members * (p->size * (STAGES + 3) + 2 * p->packed), *out[1] = {scratch};
+    const double *in[2] = {X, y};
+    if (p->members == 1 && p->move) {
+        p->move(in, out);
+    } else { /* lanes read samples that lie side by side */
+        const ptrdiff_t strides[2] = {p->packed, p->group};
+        for (ptrdiff_t m = 0; m < p->members; ++m) {
+            memcpy(theta + m * p->group, y + m * p->size, (size_t)p->group * sizeof(double));
+        }
+        in[1] = theta;
+        p->move_batch(p->members, in, strides, out);
+    }
+    memcpy(X, scratch, (size_t)(p->members * p->packed) * sizeof(double));
+    for (ptrdiff_t m = 0; m < p->members; ++m) {
+        memset(y + m * p->size, 0, (size_t)p->group * sizeof(double));
+    }
+}
+
+/* The stages of a step of length h behind the first, k[0], and the state after it. */
+static void advance(Pair *p, const double *X, const double *y, double t, double h, double *k, double *stage, double *after)
+{
+    const ptrdiff_t all = p->members * p->size;
+    for (int s = 1; s <= STAGES; ++s) {
+        const double *a = s < STAGES ? pair_a[s] : pair_b;
+        double *to = s < STAGES ? stage : after;
+        for (ptrdiff_t i = 0; i < all; ++i) { to[i] = 0.0; }
+        for (int j = 0; j < s; ++j) {
+            if (a[j] != 0.0) {
+                const double w = a[j], *from = k + j * all;
+                for (ptrdiff_t i = 0; i < all; ++i) { to[i] += w * from[i]; }
+            }
+        }
+        for (ptrdiff_t i = 0; i < all; ++i) { to[i] = y[i] + h * to[i]; }
+        if (s < STAGES) {
+            rates(p, X, stage, t + pair_c[s] * h, k + s * all);
+        }
+    }
+}
+
+/*
+ * The error of a step over what is allowed, of the worst member: that of order 5, damped by that of order 3 (Hairer, Norsett and
+ * Wanner, II.10). Entries of Theta are those of X, whose size is one. Negative where |Theta| goes beyond its reach; NaN shows.
+ */
+static double judged(const Pair *p, const double *y, const double *after, double h, const double *k)
+{
+    const ptrdiff_t all = p->members * p->size;
+    double worst = 0.0;
+    for (ptrdiff_t m = 0; m < p->members; ++m) {
+        double five = 0.0, three = 0.0, angle = 0.0;
+        for (ptrdiff_t i = 0; i < p->size; ++i) {
+            const ptrdiff_t at = m * p->size + i;
+            const double a = fabs(y[at]), b = fabs(after[at]), size = i < p->group ? 1.0 : a > b ? a : b;
+            const double scale = p->atol + p->rtol * size;
+            double e5 = 0.0, e3 = 0.0;
+            for (int s = 0; s < STAGES; ++s) {
+                e5 += pair_e5[s] * k[s * all + at];
+                e3 += pair_e3[s] * k[s * all + at];
+            }
+            five += e5 * e5 / (scale * scale);
+            three += e3 * e3 / (scale * scale);
+            angle += i < p->group ? after[at] * after[at] : 0.0;
+        }
+        const double down = five + 0.01 * three;
+        const double error = down > 0.0 ? fabs(h) * five / sqrt(down * (double)p->size) : down;
+        if (!(error <= 1e300)) {
+            return error;
+        }
+        if (angle > p->reach * p->reach) {
+            return -sqrt(angle) / p->reach;
+        }
+        worst = error > worst ? error : worst;
+    }
+    return worst;
+}
+
+/* A first step: the size of Theta and of what the rates change. */
+static double first_step(const Pair *p, const double *y, const double *k)
+{
+    double fastest = 0.0;
+    for (ptrdiff_t i = 0; i < p->members * p->size; ++i) {
+        const double rate = fabs(k[i]) / (fabs(y[i]) + 1.0);
+        fastest = rate > fastest ? rate : fastest;
+    }
+    return fastest > 0.0 ? 0.3 / fastest : INFINITY;
+}
+
+static void keep(Pair *p, const double *X, const double *y)
+{
+    for (ptrdiff_t m = 0; m < p->members; ++m) {
+        memcpy(p->X_out + (p->next * p->row + m) * p->packed, X + m * p->packed, (size_t)p->packed * sizeof(double));
+        memcpy(p->y_out + (p->next * p->row + m) * p->size, y + m * p->size, (size_t)p->size * sizeof(double));
+    }
+    ++p->next;
+}
+
+/* On to the last time, or until there is no room for more knots (FULL: call again). */
+EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps);
+EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
+{
+    const ptrdiff_t all = p->members * p->size;
+    double *k = p->work, *stage = k + all * STAGES, *after = stage + all, *scratch = after + all;
+    int fresh = 0;
+    p->knots = 0;
+    rates(p, p->X, p->y, p->t, k);
+    if (p->h <= 0.0) {
+        p->h = first_step(p, p->y, k);
+    }
+    for (ptrdiff_t taken = 0; p->next < p->count; ++taken) {
+        const double gap = p->times[p->next] - p->t - p->t_low;
+        double wish = p->h < p->longest ? p->h : p->longest, h = wish, error;
+        int ends = 0;
+        if (taken == most_steps || (p->knot_t && p->knots == p->room)) {
+            return FULL;
+        }
+        if (gap <= h * (1 + 1e-10)) { /* the next time lies within: end there if it is the last, or not alone */
+            ends = p->next + 1 == p->count || p->times[p->next + 1] - p->t <= h || gap > 0.7 * h;
+            h = ends ? gap : h;
+        } else if (gap < 1.9 * h) {
+            h = 0.5 * gap; /* not a step and a crumb */
+        }
+        if (fresh) {
+            rates(p, p->X, p->y, p->t, k);
+            fresh = 0;
+        }
+        advance(p, p->X, p->y, p->t, h, k, stage, after);
+        error = judged(p, p->y, after, h, k);
+        if (!(error <= 1.0) || error < 0.0) {
+            ++p->rejected;
+            if (error < 0.0) {
+                p->h = 0.9 * h / -error;
+            } else {
+                const double factor = 0.9 * pow(error, -1.0 / 8);
+                p->h = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN */
+            }
+            if (!(p->h > 1e-15 * fabs(p->t)) || p->h < 1e-300) {
+                return error <= 1e300 ? STUCK : LOST;
+            }
+            continue;
+        }
+        if (p->knot_t) {
+            p->knot_t[p->knots] = p->t;
+            p->knot_h[p->knots] = h;
+            memcpy(p->knot_X + p->knots * p->packed, p->X, (size_t)p->packed * sizeof(double));
+            memcpy(p->knot_y + p->knots * p->size, p->y, (size_t)p->size * sizeof(double));
+            ++p->knots;
+        }
+        ++p->steps;
+        if (!ends && gap <= h * (1 + 1e-10)) { /* a step of its own to the time within, from the same first stage */
+            double *state = stage, *X = scratch + p->members * p->packed;
+            double *next = X + p->members * p->packed;
+            memcpy(X, p->X, (size_t)(p->members * p->packed) * sizeof(double));
+            advance(p, p->X, p->y, p->t, gap, k, state, next);
+            settle(p, X, next, scratch);
+            keep(p, X, next);
+        }
+        memcpy(p->y, after, (size_t)all * sizeof(double));
+        settle(p, p->X, p->y, scratch);
+        if (ends) {
+            p->t = p->times[p->next];
+            p->t_low = 0.0;
+            keep(p, p->X, p->y);
+        } else { /* the sum in two doubles */
+            const double sum = p->t + h, rest = (p->t - sum) + h + p->t_low;
+            p->t = sum + rest;
+            p->t_low = rest - (p->t - sum);
+        }
+        {
+            const double factor = error > 0.0 ? 0.9 * pow(error, -1.0 / 8) : 6.0;
+            const double longer = h * (factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor);
+            p->h = h < wish && longer < wish ? wish : longer; /* a step that was cut says nothing against its length */
+        }
+        fresh = 1;
+    }
+    return DONE;
+}
+
+/* Fresh steps of one member from knots: the state `part` of the way through each step, part in [0, 1]. */
+EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out);
+EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out)
+{
+    double *k = p->work, *stage = k + p->size * STAGES, *after = stage + p->size, *scratch = after + p->size;
+    for (ptrdiff_t c = 0; c < count; ++c) {
+        const double *X = p->knot_X + knot[c] * p->packed, *y = p->knot_y + knot[c] * p->size, t = p->knot_t[knot[c]];
+        double *to = X_out + c * p->packed;
+        memcpy(to, X, (size_t)p->packed * sizeof(double));
+        rates(p, X, y, t, k);
+        advance(p, X, y, t, part[c] * p->knot_h[knot[c]], k, stage, after);
+        settle(p, to, after, scratch);
+        memcpy(y_out + c * p->size, after, (size_t)p->size * sizeof(double));
+    }
+}
