@@ -13,7 +13,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "pair853_table.h"
+#include "ode_table.h" /* A, B, C, E3, E5 of twelve stages */
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
@@ -92,7 +92,7 @@ static void advance(Pair *p, const double *X, const double *y, double t, double 
 {
     const ptrdiff_t all = p->members * p->size;
     for (int s = 1; s <= STAGES; ++s) {
-        const double *a = s < STAGES ? pair_a[s] : pair_b;
+        const double *a = s < STAGES ? A[s] : B;
         double *to = s < STAGES ? stage : after;
         for (ptrdiff_t i = 0; i < all; ++i) { to[i] = 0.0; }
         for (int j = 0; j < s; ++j) {
@@ -103,7 +103,7 @@ static void advance(Pair *p, const double *X, const double *y, double t, double 
         }
         for (ptrdiff_t i = 0; i < all; ++i) { to[i] = y[i] + h * to[i]; }
         if (s < STAGES) {
-            rates(p, X, stage, t + pair_c[s] * h, k + s * all);
+            rates(p, X, stage, t + C[s] * h, k + s * all);
         }
     }
 }
@@ -124,8 +124,8 @@ static double judged(const Pair *p, const double *y, const double *after, double
             const double scale = p->atol + p->rtol * size;
             double e5 = 0.0, e3 = 0.0;
             for (int s = 0; s < STAGES; ++s) {
-                e5 += pair_e5[s] * k[s * all + at];
-                e3 += pair_e3[s] * k[s * all + at];
+                e5 += E5[s] * k[s * all + at];
+                e3 += E3[s] * k[s * all + at];
             }
             five += e5 * e5 / (scale * scale);
             three += e3 * e3 / (scale * scale);

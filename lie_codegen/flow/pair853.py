@@ -20,11 +20,11 @@ from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, ComputationError
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.ode import table_header
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import share_out
 
 _STAGES = 12
-_FILES = ("pair853.c", "pair853_table.h")
 _DONE, _FULL, _STUCK, _LOST = range(4)
 #: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots.
 _STEPS = 4096
@@ -279,7 +279,8 @@ def _library() -> Any:
     """pair853.c, loaded; None where there is no compiler."""
 
     def files() -> dict[str, str]:
-        return {name: (template_folder() / name).read_text(encoding="utf-8") for name in _FILES}
+        text = (template_folder() / "pair853.c").read_text(encoding="utf-8")
+        return {"pair853.c": text, "ode_table.h": table_header()}
 
     try:
         path = build_source(files, "pair853.c", namespace="pair853", definition="pair853", more_flags=("-O3",))

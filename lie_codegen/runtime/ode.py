@@ -271,7 +271,8 @@ def _pointers(*arrays: Array | NDArray[np.intp]) -> list[ctypes.c_void_p]:
     return [ctypes.c_void_p(np.ascontiguousarray(each).ctypes.data) for each in arrays]
 
 
-def _table() -> str:
+def table_header() -> str:
+    """The pair's coefficients as C."""
     rows = ["static const double A[STAGES][STAGES] = {"]
     rows += [f"    {{ {', '.join(repr(row.get(j, 0.0)) for j in range(len(dop853.A)))} }}," for row in dop853.A]
     rows.append("};")
@@ -285,7 +286,7 @@ def _library() -> ctypes.CDLL | None:
     """The compiled loops; None where there is no compiler."""
 
     def files() -> dict[str, str]:
-        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), "ode_table.h": _table()}
+        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), "ode_table.h": table_header()}
 
     try:
         path = build_source(files, "ode.c", namespace="lie_codegen_ode", definition="ode")
