@@ -25,11 +25,14 @@ from .averaging import VibrationLine as VibrationLine
 from .averaging import areas as areas
 from .averaging import average as average
 from .averaging import averaged_kernels as averaged_kernels
+from .averaging import connection as connection
 from .averaging import convergence as convergence
 from .averaging import corollary_bound as corollary_bound
 from .averaging import corollary_check as corollary_check
+from .averaging import example_connection as example_connection
 from .averaging import feedback_average as feedback_average
 from .averaging import floquet as floquet
+from .averaging import gait as gait
 from .averaging import line_drift as line_drift
 from .averaging import magnus as magnus
 from .averaging import moments as moments

@@ -11,9 +11,12 @@ from .corollary_bounds import corollary_bound as corollary_bound
 from .corollary_bounds import corollary_check as corollary_check
 from .feedback import feedback_average as feedback_average
 from .floquet_orbit import floquet as floquet
+from .gait_design import gait as gait
 from .kernels import averaged_kernels as averaged_kernels
 from .magnus import magnus as magnus
 from .order_check import order_check as order_check
+from .shape_connection import connection as connection
+from .shape_examples import example_connection as example_connection
 from .vibration_drift import VibrationLine as VibrationLine
 from .vibration_drift import line_drift as line_drift
 from .vibration_drift import spectral_drift as spectral_drift

@@ -1,0 +1,85 @@
+"""Kernels of a connection: A(r), and the step by which a gait moves the body."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.averaging.shape_form import ShapeForm
+from lie_codegen.errors import InputError
+from lie_codegen.groups.maps.matrices import matrix_port, random_element
+from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
+from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.block_solve import solve
+from lie_codegen.kernel.expressions import ExpressionEvaluator
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import Matrix, Vector, bracket, dot, plus, scaled
+from lie_codegen.kernel.structural_zeros import add, is_zero, product
+
+NAMESPACE = "shape"
+SOURCE = "TR 93-59, section 6; Hatton and Choset, IEEE T-RO 29 (2013)"
+
+
+def connection_kernels(connection: ShapeForm, harmonics: int = 3) -> tuple[Kernel, ...]:
+    """connection: r -> A(r); gait_step: (X, gait, t, h) -> X_next, one Magnus step of order 4 along a Fourier series of period 2 pi.
+
+    Raises:
+        InputError: a connection with a changed frame; generate the original one, X(T) differs by the constant h_0.
+    """
+    if connection.frame is not None:
+        raise InputError(
+            "kernels: generate the connection as it was given; a change of frame turns X(T) by the constant h(r_0) alone"
+        )
+    group, n, k = connection.group, connection.group.dim, connection.size
+    symbols = sp.symbols(" ".join(connection.shape), real=True, seq=True)
+    data = WeiNormanData(group)
+
+    def at(ops: Arithmetic, r: Vector) -> Matrix:
+        evaluate = ExpressionEvaluator(ops, dict(zip(symbols, r, strict=True)))
+        if connection.exact_A is not None:
+            return [[evaluate(entry) for entry in row] for row in connection.exact_A.tolist()]
+        M = sp.ImmutableMatrix(connection.exact_metric)
+        block = {(i, j): evaluate(M[i, j]) for i in range(n) for j in range(n) if M[i, j] != 0}
+        columns = [{i: evaluate(M[i, n + j]) for i in range(n) if M[i, n + j] != 0} for j in range(k)]
+        solved = solve(block, columns, n)
+        return [[solved[j].get(i, 0) for j in range(k)] for i in range(n)]
+
+    def rate(ops: Arithmetic, gait: Matrix, t: Scalar) -> Vector:
+        """-A(r) r' at time t."""
+        c, s = ops.cos(t), ops.sin(t)
+        waves: list[tuple[Scalar, Scalar]] = [(1, 0), (c, s)]
+        for _ in range(harmonics - 1):
+            x, y = waves[-1]
+            waves.append((x * c - y * s, y * c + x * s))
+        r: Vector = [row[0] for row in gait]
+        moving: Vector = [0] * k
+        for i, row in enumerate(gait):
+            for m in range(1, harmonics + 1):
+                a, b, (x, y) = row[m], row[harmonics + m], waves[m]
+                r[i] = add(r[i], a * x + b * y)
+                moving[i] = add(moving[i], m * (b * x - a * y))
+        return [product(-1, dot(row, moving)) for row in at(ops, r)]
+
+    def step(ops: Arithmetic, X: Any, gait: Matrix, t: Scalar, h: Scalar) -> tuple[Any, ...]:
+        offset = 3**0.5 / 6
+        first, second = (rate(ops, gait, t + h * (0.5 + sign * offset)) for sign in (-1, 1))
+        turned = bracket(ops, group.algebra, first, second)
+        omega = plus(scaled(h / 2, plus(first, second)), scaled(h * h * (3**0.5 / 12), turned))
+        moved = times_taylor_exp(group, ops, X, omega, TAYLOR_DEGREE)
+        return ([[0.0 if is_zero(entry) else entry for entry in row] for row in moved],)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        table = [[rng.uniform(-0.5, 0.5) for _ in range(2 * harmonics + 1)] for _ in range(k)]
+        return random_element(group, data, rng), table, rng.uniform(0, 6), rng.uniform(0.01, 0.1)
+
+    r = Port("r", (k,), description=", ".join(connection.shape))
+    gait = Port("gait", (k, 2 * harmonics + 1), description="mean, cosines, sines of each shape")
+    return (
+        Kernel("connection", NAMESPACE, (r,), (Port("A", (n, k)),),
+               lambda ops, r: (at(ops, r),), "xi = -A(r) r'", SOURCE),
+        Kernel("gait_step", NAMESPACE, (matrix_port(group, "X"), gait, Port("t", ()), Port("h", ())), (matrix_port(group, "X_next"),),
+               step, "X' = X hat(-A(r) r'), one Magnus step of order 4", SOURCE, sampler),
+    )  # fmt: skip
