@@ -5,6 +5,9 @@
  * for a scalar) goes straight to the C function. Everything else, and every error, is the business of the Python
  * callable `slow`, which gets the arguments unchanged: so both ways mean the same.
  */
+#if defined(__linux__)
+#define _GNU_SOURCE /* madvise */
+#endif
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <stddef.h>
@@ -12,6 +15,8 @@
 
 #define NPY_NO_DEPRECATED_API NPY_1_7_API_VERSION
 #include <numpy/arrayobject.h>
+
+#include "output_pool.h"
 
 #define MOST_PORTS 32
 #define RELEASE_FROM 32 /* samples from which giving up the interpreter lock pays */
@@ -127,7 +132,7 @@ static PyObject *several(const Function *self, PyObject **outputs)
 static inline PyObject *new_array(const Port *port, int ndim, npy_intp *dims)
 {
     Py_INCREF(port->descr);
-    return PyArray_NewFromDescr(&PyArray_Type, port->descr, ndim, dims, NULL, NULL, 0, NULL);
+    return pool_array(port->descr, ndim, dims, port->is_complex ? 2 * sizeof(double) : sizeof(double));
 }
 
 /* Whether two ranges of memory share a byte. */
@@ -518,8 +523,46 @@ static PyTypeObject FunctionType = {
     .tp_getset = attributes,
 };
 
+/* empty(shape, is_complex): as numpy.empty, of the memory of large results. */
+static PyObject *make_empty(PyObject *module, PyObject *args)
+{
+    PyObject *shape;
+    npy_intp dims[NPY_MAXDIMS];
+    int is_complex, k, ndim;
+    (void)module;
+    if (!PyArg_ParseTuple(args, "O!p", &PyTuple_Type, &shape, &is_complex)) {
+        return NULL;
+    }
+    ndim = (int)PyTuple_GET_SIZE(shape);
+    if (ndim > NPY_MAXDIMS) {
+        PyErr_SetString(PyExc_ValueError, "too many axes");
+        return NULL;
+    }
+    for (k = 0; k < ndim; ++k) {
+        dims[k] = PyNumber_AsSsize_t(PyTuple_GET_ITEM(shape, k), PyExc_OverflowError);
+        if (dims[k] < 0) {
+            if (!PyErr_Occurred()) {
+                PyErr_SetString(PyExc_ValueError, "negative dimensions are not allowed");
+            }
+            return NULL;
+        }
+    }
+    return pool_array(PyArray_DescrFromType(is_complex ? NPY_CDOUBLE : NPY_DOUBLE), ndim, dims,
+        is_complex ? 2 * sizeof(double) : sizeof(double));
+}
+
+/* idle_bytes(): of results that are gone, kept for the next ones. */
+static PyObject *idle_bytes(PyObject *module, PyObject *none)
+{
+    (void)module;
+    (void)none;
+    return PyLong_FromSize_t(pool_idle_bytes);
+}
+
 static PyMethodDef functions[] = {
     {"function", make_function, METH_VARARGS, function_doc},
+    {"empty", make_empty, METH_VARARGS, NULL},
+    {"idle_bytes", idle_bytes, METH_NOARGS, NULL},
     {NULL, NULL, 0, NULL},
 };
 

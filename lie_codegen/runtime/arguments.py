@@ -11,6 +11,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import ShapeError
 from lie_codegen.kernel.kernel import Port
+from lie_codegen.runtime.outputs import empty
 
 REAL = np.dtype(np.float64)
 COMPLEX = np.dtype(np.complex128)
@@ -113,7 +114,7 @@ def outputs_for(signature: Signature, out: Any, lead: tuple[int, ...]) -> list[A
     """
     ports = signature.outputs
     if out is None:
-        return [np.empty(lead + port.shape, dtype_of(port)) for port in ports]
+        return [empty(lead + port.shape, dtype_of(port)) for port in ports]
     given = list(out) if isinstance(out, (tuple, list)) else [out]
     if len(given) != len(ports):
         raise ShapeError(f"{signature.name} has {len(ports)} outputs, out= has {len(given)}")
