@@ -1,50 +1,48 @@
-"""lc.closed_loop: a mechanical system on a group under a law, by a fourth-order Lie-group method in compiled loops."""
+"""lc.closed_loop: a body, a velocity or a mechanism under a law, in compiled loops."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Never, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.disturbance import ForceBody
+from lie_codegen.control.loop_arguments import LoopArguments, loop_arguments
+from lie_codegen.control.loop_error import loop_error
 from lie_codegen.control.loop_library import loop_library, loop_numbers, several
+from lie_codegen.control.loop_run import Run, noise_stream, refined
+from lie_codegen.control.loop_states import initial_own, own_states
 from lie_codegen.control.reference_check import check_reference
-from lie_codegen.control.reference_motion import Reference
-from lie_codegen.control.second_order_step import ForceBody, check_loop, law_parameters, law_states
-from lie_codegen.errors import ComputationError, InputError, ShapeError
-from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.maps.element_pattern import packed_size
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.errors import InputError
 from lie_codegen.identifiers import unknown_keywords
-from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.mechanics.states import initial_states, split_states
-from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.patience import shows_progress
-
-_MOST_STEPS = 2**21
-_LARGEST_MOVE = 0.25
-#: Steps for which the reference is held in memory at once.
-_BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedLoop(Saved):
-    """A solution of X' = X hat(xi), I xi' = ad*_xi I xi + f.
+    """A motion under a law: X' = X hat(xi), I xi' = ad*_xi I xi + f, or X' = X hat(u).
 
     Attributes:
         t: (k,) times.
-        X: (k, d, d) configurations, on the group to rounding; (k, N, d, d) for N initial states.
-        xi: (k, n) body velocities; (k, N, n).
-        outputs: what the law gives along the way, by the names of its outputs (force or torque, phi, W, W_dot, V ...),
-            and its own states (integral).
+        X: (k, d, d) configurations, on the group to rounding; (k, N, d, d) for N loops.
+        xi: (k, n) body velocities; (k, N, n). Of a law that commands the velocity, what it commands.
+        outputs: what the law gives along the way, by the names of its outputs (force or torque, phi, W, W_dot, V ...), from
+            the true state; and its own states (integral).
         X_d, xi_d: the reference, (k, d, d) and (k, n), or None.
         steps: number of integration steps.
         error_estimate: difference to the run with twice the step, over 15 (Richardson); NaN for a fixed step.
+        u: (k, m) the command that acts from each time on, within the limits, its noise and its delay included; (k, N, m).
+            None without a law.
+        states: the law's and the observer's own states by name, (k, ...) or (k, N, ...): as the law used them at that time.
+        group: the group, or None for a mechanism that is not on one.
     """
 
     t: Array
@@ -55,23 +53,46 @@ class ClosedLoop(Saved):
     xi_d: Array | None
     steps: int
     error_estimate: float
+    u: Array | None = None
+    states: dict[str, Array] = field(default_factory=dict)
+    group: Any = None
+
+    @cached_property
+    def error(self) -> Array:
+        """(k,) or (k, N) distance to the reference, to the identity without one.
+
+        The angle [rad] of X_d^-1 X for rotations, else the norm of the logarithm's coordinates, NaN where there is no
+        logarithm; off groups the distance |q - r|.
+        """
+        return loop_error(self.group, self.X, self.X_d)
 
 
 @overload
 def closed_loop(
-    group: GroupLike,
+    group: Any = None,
     *,
-    inertia: Any,
-    law: Kernel | None = None,
-    reference: Reference | None = None,
-    external: ForceBody | None = None,
+    law: Any = None,
+    inertia: Any = None,
+    gains: Mapping[str, ArrayLike] | None = None,
+    reference: Any = None,
     X0: ArrayLike | None = None,
     xi0: ArrayLike | None = None,
     t: ArrayLike,
+    rtol: float | None = None,
     step: float | None = None,
-    tolerance: float = 1e-10,
-    gains: Mapping[str, ArrayLike] | None = None,
+    sample: float | None = None,
+    delay: float | None = None,
+    noise: Mapping[str, ArrayLike] | None = None,
+    limits: ArrayLike | None = None,
+    disturbance: Any = None,
+    observer: Any = None,
+    states: Mapping[str, ArrayLike] | None = None,
+    seed: int | None = None,
+    runs: int | None = None,
+    first: int = 0,
     threads: int = 1,
+    external: ForceBody | None = None,
+    tolerance: float | None = None,
 ) -> ClosedLoop: ...
 
 
@@ -95,63 +116,93 @@ def closed_loop(
 
 @shows_progress
 def closed_loop(
-    group: GroupLike | None = None,
+    group: Any = None,
     *,
+    law: Any = None,
     inertia: Any = None,
-    law: Kernel | None = None,
-    reference: Reference | None = None,
-    external: ForceBody | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
+    reference: Any = None,
     X0: ArrayLike | None = None,
     xi0: ArrayLike | None = None,
     t: ArrayLike,
+    rtol: float | None = None,
     step: float | None = None,
-    tolerance: float = 1e-10,
-    gains: Mapping[str, ArrayLike] | None = None,
+    sample: float | None = None,
+    delay: float | None = None,
+    noise: Any = None,
+    limits: ArrayLike | None = None,
+    disturbance: Any = None,
+    observer: Any = None,
+    states: Mapping[str, ArrayLike] | None = None,
+    seed: int | None = None,
+    runs: int | None = None,
+    first: int = 0,
     threads: int = 1,
+    external: ForceBody | None = None,
+    tolerance: float | None = None,
     mpc: Any = None,
     values: Mapping[str, Any] | None = None,
     plant: Any = None,
     plant_values: Mapping[str, Any] | None = None,
-    noise: Any = None,
-    delay: int | None = None,
     compensate: bool | None = None,
     substeps: int | None = None,
-    seed: int | None = None,
-    runs: int | None = None,
     **unknown: Never,
 ) -> Any:
-    """Simulates the second-order system, compiled; the law itself is the one that `generate` writes for flight.
+    """Simulates a loop, compiled; the law itself is the one that `generate` writes for flight.
+
+    A law that gives a force moves a body, X' = X hat(xi), I xi' = ad*_xi I xi + f; one that gives a velocity moves X' = X hat(u).
+    Without `sample` the law acts continuously. With it the law is called every `sample` seconds, its command is held between,
+    and its own states take one step a call (z + sample z_dot).
+
+    N loops at once: where X0, xi0, inertia, gains, limits, disturbance or noise have an axis of length N in front, or by `runs`.
 
     Args:
-        group: any matrix group, its name or its file.
-        inertia: symmetric positive definite: a number, a diagonal or a matrix, which is compiled in; or (N, n, n), one a loop:
-            then it is an input of one compiled step.
-        law: an attitude or tracking law, perhaps with states of its own, zero at the start: inputs behind the usual ones
-            (integral) beside outputs that are their rates (integral_dot). None for an uncontrolled body.
-        reference: for a tracking law.
-        external: further body forces (ops, t, X, xi) -> (n,), as those of `underwater_forces`.
+        group: any matrix group, its name or its file; that of the law if not given.
+        law: a Kernel whose inputs are among X (or q), xi (or omega, q_dot), X_d, xi_d, xi_d_dot (or r, r_dot, r_ddot), y, t, h,
+            states of its own (z with an output z_dot, q with an output q_next, X_hat with an output u_hat) and numbers; or
+            something with such a kernel as `.kernel`. None for an uncontrolled body.
+        inertia: of the body, symmetric positive definite: a number, a diagonal or a matrix, which is compiled in; or (N, n, n),
+            one a loop: then it is an input of one compiled step. A law that commands the velocity needs none.
+        gains: values of the law's numbers that are inputs (`k_p="input"`): name -> a number, or one a loop, (N, *shape). A
+            law's `inertia` is that of the body unless it is given here.
+        reference: what `lc.reference` makes or takes: a reference, a plan, formulas of t. An attitude law follows it by its
+            `tracking` form; any other law that gives a velocity and reads no reference is given X_d^-1 X, and the reference's
+            velocity is added to its command.
         X0: (d, d) or (N, d, d) initial configurations, the identity if not given.
         xi0: (n,) or (N, n) initial body velocities, zero if not given.
         t: (k,) equally spaced times.
-        step: integration step [s]; None halves it until two runs agree to the tolerance.
-        tolerance: on the entries of X and xi at the times t, for step None.
-        gains: values of the law's numbers that are inputs (`k_p="input"`): name -> a number, or one a loop, (N, *shape). A
-            law's `inertia` is that of the body unless it is given here.
+        rtol: on the entries of the state at the times t, absolute: steps are halved until two runs agree; 1e-10 if neither it
+            nor `step` is given. Of more than 64 sampled loops 64 are watched.
+        step: integration step [s].
+        sample: [s] from one call of the law to the next; the times t must fall on calls.
+        delay: from the measurement to when its command acts: an int counts samples, a float is in seconds, a multiple of
+            `sample`. Until the first command arrives, zero acts. Without `sample`, `step` is the sample, as for noise.
+        noise: standard deviations, Gaussian: {"X": of a turn X exp(hat(.)) of the measured configuration, "xi": of the
+            measured velocity, "u": of the command as it acts, behind the limits, "y": of what a sensor sees}, each a number,
+            one a component, or (N, components); "bias" is a constant offset of the measured velocity.
+        limits: largest magnitude of the command: a number, (m,) or (N, m).
+        disturbance: beside the command: formulas of t, X[i][j], xi[i] (or X11, xi1 ...), one a component; constants, (m,) or (N, m);
+            a Kernel of some of t, X, xi.
+        observer: what estimates X and xi from y and the measured velocity u: an object with `kernel`, (X_hat, bias, u, y, h) ->
+            (X_hat_next, bias_next), and `directions`, the c of y = X^-1 c. The law is then given X_hat and u - bias.
+        states: start of the law's and the observer's own states, by name; else what the law says, else zero or the identity.
+        seed: of the noise, 0 if not given. The numbers of loop i at sample j are those of Philox4x32 with the key `seed` at
+            the counter (j, i): they do not depend on what else is run.
+        runs: so many loops, alike but for their noise. With `mpc`: so many runs, of seeds in turn.
+        first: index of the first loop among all, for batches in several calls.
         threads: over which many loops are shared out.
+        external: further body forces (ops, t, X, xi) -> (n,) over any arithmetic, as those of `underwater_forces`.
+        tolerance: the old name of rtol.
         mpc: a controller of `lc.mpc`, instead of group, inertia and law: its loop from t[0] to t[-1], a sample an interval;
             returns its LoopRun, or a tuple of them.
         values: with `mpc` alone, as what follows: states and parameters of the problem, by name.
         plant, plant_values: another problem (or Plant) that is really there, and its parameters; the controller's own if not given.
-        noise: standard deviation of what is measured, 0 if not given.
-        delay: samples between measurement and control, 0 if not given.
         compensate: whether the controller looks ahead over the delay, True if not given.
         substeps: integration steps of the plant a sample, 4 if not given.
-        seed: of the noise, 0 if not given.
-        runs: so many runs, of seeds in turn.
 
     Raises:
         InputError: an inertia that is not positive definite, a reference that jumps, a law without its reference or without a
-            number that is an input of it.
+            number that is an input of it; any other argument that does not fit, named.
         ShapeError: arrays of different numbers of loops.
         NotOnGroupError: X0 is off the group.
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
@@ -159,169 +210,110 @@ def closed_loop(
     if unknown:
         known = set(inspect.signature(closed_loop).parameters) - {"unknown"}
         raise InputError(unknown_keywords("closed_loop", unknown, known))
-    loop = {
-        "values": values, "plant": plant, "plant_values": plant_values, "noise": noise, "delay": delay,
-        "compensate": compensate, "substeps": substeps, "seed": seed, "runs": runs,
-    }  # fmt: skip
-    loop = {name: value for name, value in loop.items() if value is not None}
-    times = _times(t)
     if mpc is not None:
+        given = {
+            "values": values, "plant": plant, "plant_values": plant_values, "noise": noise, "delay": delay,
+            "compensate": compensate, "substeps": substeps, "seed": seed, "runs": runs,
+        }  # fmt: skip
+        times = np.asarray(t, dtype=float)
         # the controller brings its own loop: it lives on a floor above this one
-        return mpc.simulate(X0, duration=float(times[-1] - times[0]), **loop)
-    if loop or group is None:
-        said = f"{', '.join(loop)} without mpc=" if loop else "no group"
-        raise InputError(
-            f"closed_loop: {said}; without mpc= it takes a group, inertia, law, reference, external, X0, xi0, t"
-        )
-    group = as_group(group, "closed_loop")
-    if not (law is None or isinstance(law, Kernel)):
-        raise InputError(
-            f"closed_loop: law is a Kernel, as lc.tracking_law or lc.attitude_law makes it, got {law!r:.60}"
-        )
-    if reference is not None and reference.group != group:
-        raise InputError(f"the reference is one of {reference.group.name}, not of {group.name}")
-    check_loop(law, reference)
-    numbers, each, loops = loop_numbers(group, inertia, law, gains or {})
-    lib = loop_library(group, "input" if "inertia_inverse" in numbers else inertia, law, reference, external)
-    if reference is not None:
-        check_reference(reference, float(times[0]), float(times[-1]), lib.reference)
-    start, many = initial_states(group, X0, xi0)
-    if loops is not None:
-        start, many = several(start, loops), True
-    if law is not None:
-        own = sum(port.size for port in law_states(law))
-        start = np.ascontiguousarray(np.concatenate([start, np.zeros((len(start), own))], axis=1))
-    if step is not None:
-        count = max(1, int(np.ceil((times[1] - times[0]) / step - 1e-9)))
-        states, error = _run(lib, start, times, count, many, numbers, threads), float("nan")
-    else:
-        states, count, error = _refined(lib, start, times, many, tolerance, group, numbers, threads)
-    X, xi = split_states(group, states)
-    own_states = states[..., packed_size(group) + group.dim :]
-    outputs, X_d, xi_d = _outputs(lib, law, reference, times, X, xi, own_states, many, each)
-    return ClosedLoop(times, X, xi, outputs, X_d, xi_d, count * (len(times) - 1), error)
-
-
-def _times(t: ArrayLike) -> Array:
-    times = np.asarray(t, dtype=float)
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)):
-        raise ShapeError(f"closed_loop: t has shape {times.shape}; give at least two finite times")
-    gaps = np.diff(times)
-    if gaps[0] <= 0 or np.max(np.abs(gaps - gaps[0])) > 1e-9 * abs(gaps[0]) * len(times):
-        raise InputError("closed_loop: t must increase in equal steps, as numpy.linspace gives them")
-    return times
-
-
-def _run(
-    lib: Library, start: Array, times: Array, every: int, many: bool, numbers: Mapping[str, Array], threads: int
-) -> Array:
-    """(k, N, m) or (k, m) states at the times, `every` steps from one to the next."""
-    total = every * (len(times) - 1)
-    h = (times[-1] - times[0]) / total
-    block = every * max(1, _BLOCK // every)
-    states = [start[None] if many else start[0][None]]
-    for first in range(0, total, block):
-        count = min(block, total - first)
-        stages = _stages(lib, times[0] + h * first, h, count)
-        clock = times[0] + h * (first + np.arange(count))
-        if many:
-            states.append(
-                _advance_all(lib, np.ascontiguousarray(states[-1][-1]), clock, h, stages, every, numbers, threads)
-            )
-        else:
-            run = lib.second_order_step.scan(states[-1][-1], n=count, every=every, t=clock, h=h, **stages, **numbers)
-            states.append(np.asarray(run)[1:])
-    return np.concatenate(states)
-
-
-def _stages(lib: Library, start: float, h: float, count: int) -> dict[str, Array]:
-    """The reference at the ends and the middle of each step, as the step takes it; nothing for other laws."""
-    names = [port.name for port in lib.second_order_step.inputs[3:6] if port.name in ("X_d", "xi_d", "xi_d_dot")]
-    if not names:
-        return {}
-    X, xi, rate = lib.reference.batch(start + h / 2 * np.arange(2 * count + 1))
-    flat = (X.reshape(len(X), -1), xi, rate)
-    return {
-        name: np.ascontiguousarray(np.stack([values[:-1:2], values[1::2], values[2::2]], axis=1))
-        for name, values in zip(names, flat, strict=True)
+        chosen = {name: value for name, value in given.items() if value is not None}
+        return mpc.simulate(X0, duration=float(times[-1] - times[0]), **chosen)
+    of_mpc = {
+        "values": values,
+        "plant": plant,
+        "plant_values": plant_values,
+        "compensate": compensate,
+        "substeps": substeps,
     }
+    stray = [name for name, value in of_mpc.items() if value is not None]
+    if stray:
+        raise InputError(
+            f"closed_loop: {', '.join(stray)} without mpc=; these options are those of a controller of lc.mpc"
+        )
+    told = loop_arguments(
+        group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step, sample=sample,
+        delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains,
+    )  # fmt: skip
+    loop, library = loop_library(told.model, told.reference, told.kind)
+    numbers, loops = loop_numbers(loop, told.inertia, gains or {}, told.numbers)
+    if told.reference is not None:
+        check_reference(told.reference, float(told.times[0]), float(told.times[-1]), library.reference)
+    start, many = loop.plant.starts(X0, xi0)
+    start, many = several(start, many, loops, runs)
+    start = initial_own(loop, start, {**told.start, **(states or {})})
+    stream = noise_stream(loop, _whole(seed, "seed", 0), _whole(first, "first", 0))
+    run = Run(loop, library, start, many, told.times, numbers, threads, told.sample or 0.0, told.delay, stream)
+    if told.step is not None:
+        found, count, error = run.states(told.parts), told.parts, float("nan")
+    else:
+        found, count, error = refined(run, told.rtol, _narrower)
+    return _result(run, told, found, count, error)
 
 
-def _advance_all(
-    lib: Library,
-    current: Array,
-    clock: Array,
-    h: float,
-    stages: dict[str, Array],
-    every: int,
-    numbers: Mapping[str, Array],
-    threads: int,
-) -> Array:
-    """(count / every, N, m) states of many runs."""
-    shared: dict[str, Any] = {name: values[None] for name, values in stages.items()}
-    step = lib.second_order_step
-    runs = step.scan_batch(current, n=len(clock), every=every, threads=threads, t=clock[None], h=h, **shared, **numbers)
-    return np.ascontiguousarray(np.moveaxis(runs[:, 1:], 0, 1))
+def _whole(value: Any, name: str, default: int) -> int:
+    if value is None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise InputError(f"closed_loop: {name} is a whole number, not negative; given {value!r}")
+    return int(value)
 
 
-def _refined(
-    lib: Library,
-    start: Array,
-    times: Array,
-    many: bool,
-    tolerance: float,
-    group: MatrixGroup,
-    numbers: Mapping[str, Array],
-    threads: int,
-) -> tuple[Array, int, float]:
-    every, previous = 1, None
-    gap = times[1] - times[0]
-    while every * (len(times) - 1) <= _MOST_STEPS:
-        states = _run(lib, start, times, every, many, numbers, threads)
-        speed = np.max(np.abs(states[..., packed_size(group) :])) if np.all(np.isfinite(states)) else np.inf
-        if previous is not None and np.isfinite(speed):
-            error = float(np.max(np.abs(states - previous))) / 15
-            if error <= tolerance and speed * gap / every <= _LARGEST_MOVE:
-                return states, every, error
-        previous = states if np.isfinite(speed) else None
-        every *= 2
-    raise ComputationError(
-        f"closed_loop({group.name}): {_MOST_STEPS} steps do not bring the error below {tolerance:g}, or the state grows "
-        "without bound; shorten the time, loosen the tolerance, or check the gains"
+def _narrower(run: Run, loops: Array) -> Run:
+    """Some of the loops alone; their noise is other numbers, as large."""
+    ranks = {port.name: len(port.shape) for port in run.loop.number_ports(noisy=True)}
+    numbers = {
+        name: np.ascontiguousarray(value[loops]) if value.ndim > ranks[name] else value
+        for name, value in run.numbers.items()
+    }
+    return replace(run, start=np.ascontiguousarray(run.start[loops]), numbers=numbers)
+
+
+def _result(run: Run, told: LoopArguments, found: Array, count: int, error: float) -> ClosedLoop:
+    loop, times = run.loop, run.times
+    X, xi = loop.plant.split(found)
+    states = own_states(loop, found, sampled=bool(run.sample))
+    outputs, u, moves = _outputs(run, found)
+    if run.sample and loop.law is not None:
+        u = np.ascontiguousarray(found[..., -loop.plant.sizes[2] :])
+    if loop.plant.order == 1 and u is not None:
+        xi = u
+    gap = run.sample or float(times[1] - times[0])
+    steps = count * round((times[-1] - times[0]) / gap)
+    group = getattr(loop.plant, "group", None)
+    shared = {name: value for name, value in states.items() if name not in outputs}
+    return ClosedLoop(
+        times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group
     )
 
 
-def _outputs(
-    lib: Library,
-    law: Kernel | None,
-    reference: Reference | None,
-    times: Array,
-    X: Array,
-    xi: Array,
-    own_states: Array,
-    many: bool,
-    numbers: Mapping[str, Array],
-) -> tuple[dict[str, Array], Array | None, Array | None]:
-    X_d = xi_d = None
-    arguments: list[Array] = []
-    shape = X.shape[:-2]
-    if reference is not None:
-        X_d, xi_d, rate = lib.reference.batch(times)
-        arguments = [np.repeat(x, shape[1], axis=0) if many else x for x in (X_d, xi_d, rate)]
-    if law is None:
-        return {}, X_d, xi_d
-    flat = [np.ascontiguousarray(x.reshape(-1, *x.shape[len(shape) :])) for x in (X, xi)]
-    ports = law_states(law)
-    ends = np.cumsum([port.size for port in ports], dtype=int)
-    own = (
-        dict(zip((port.name for port in ports), np.split(own_states, ends[:-1], axis=-1), strict=True)) if ports else {}
-    )
-    parts: dict[str, Any] = {name: np.ascontiguousarray(z.reshape(-1, z.shape[-1])) for name, z in own.items()}
-    tuned: dict[str, Any] = {p.name: _repeated(p, numbers[p.name], len(times)) for p in law_parameters(law)}
-    values = lib[law.name].batch(*flat, *arguments, **parts, **tuned)
-    names = [port.name for port in law.outputs]
-    given = {key: v.reshape(*shape, *v.shape[1:]) for key, v in zip(names, values, strict=True)}
-    return {**given, **own}, X_d, xi_d
+def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
+    """What the law gives at the times, its command within the limits, and the reference."""
+    loop, times = run.loop, run.times
+    moves = run.reference(times)
+    if loop.law is None:
+        return {}, None, moves
+    inner = loop.extent(sampled=False)
+    states = found[..., :inner]
+    if run.sample:  # the own states as the law used them stand behind those that it will use next
+        place = sum(loop.plant.sizes[:2])
+        own = inner - place
+        states = np.concatenate([found[..., :place], found[..., place + own : place + 2 * own]], axis=-1)
+    shape = states.shape[:-1]
+    repeats = shape[1] if run.many else 1
+    kernel = run.library.loop_outputs
+    given: dict[str, Any] = {"t": np.repeat(times, repeats), "h": run.sample}
+    given |= {name: np.repeat(value, repeats, axis=0) if run.many else value for name, value in moves.items()}
+    given |= {
+        port.name: _repeated(port, run.numbers[port.name], len(times))
+        for port in kernel.inputs
+        if port.name in run.numbers
+    }
+    names = [port.name for port in kernel.inputs[1:]]
+    flat = np.ascontiguousarray(states.reshape(-1, inner))
+    made = kernel.batch(flat, **{name: given[name] for name in names}, threads=run.threads)
+    values = {port.name: v.reshape(*shape, *v.shape[1:]) for port, v in zip(kernel.outputs, made, strict=True)}
+    return values, values.pop("u"), moves
 
 
 def _repeated(port: Port, values: Array, times: int) -> Array:

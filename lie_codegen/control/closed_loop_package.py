@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.control.loop_ports import read_law
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.reference_motion import Reference
-from lie_codegen.control.second_order_step import check_loop, held_force_step, law_states
+from lie_codegen.control.second_order_step import check_loop, held_force_step
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -91,6 +92,7 @@ def generate_closed_loop(
 def _view(
     group: MatrixGroup, law: Kernel, reference: Reference | None, state: Any, duration: float, step: float
 ) -> LoopView:
+    read = read_law(law)
     parts = 2 if group.is_complex else 1
     d = group.degree
     places = tuple(parts * (i * d + j) + part for i, j in varying_entries(group) for part in range(parts))
@@ -105,7 +107,7 @@ def _view(
         plant="held_force_step",
         energy=energy,
         outputs=tuple((port.name, port.size) for port in law.outputs),
-        own=tuple((port.name, port.size) for port in law_states(law)),
+        own=() if read is None else tuple((each.name, each.port.size) for each in read.states),
         entries=packed_size(group),
         matrix_size=parts * d * d,
         dim=group.dim,

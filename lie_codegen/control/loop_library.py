@@ -1,4 +1,4 @@
-"""What a closed loop runs on: its compiled step, law and reference, and the numbers that are their inputs."""
+"""What a closed loop runs on: its compiled kernels, and the numbers that are their inputs."""
 
 from __future__ import annotations
 
@@ -10,85 +10,119 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
+from lie_codegen.control.loop_model import NOISE, Loop, loop_model
 from lie_codegen.control.reference_kernels import reference_kernel
-from lie_codegen.control.reference_motion import Reference
-from lie_codegen.control.second_order_step import ForceBody, law_parameters, second_order_step
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.definition import Definition, made_from, plain
+from lie_codegen.kernel.definition import Definition, NoDefinitionError, made_from, plain
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.runtime.build import build_kernels, defined_together
 from lie_codegen.runtime.library import Library
 
+#: Which kernels a loop needs: continuous, sampled at every step, or sampled with several steps between two calls.
+KINDS = {
+    "continuous": (loop_step,),
+    "sampled": (loop_control, loop_sample),
+    "held": (loop_control, loop_motion),
+}
 
-def loop_library(
-    group: MatrixGroup, inertia: Any, law: Kernel | None, reference: Reference | None, external: ForceBody | None
-) -> Library:
-    """second_order_step, the law and the reference, compiled.
+
+def loop_library(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Library]:
+    """The loop of these arguments of `loop_model`, and its kernels with the reference, compiled.
 
     What follows from definitions is built once a process and known by them; a further force is a Python function, which
     may have changed since, so with it everything is derived again.
     """
-    definition = getattr(reference, "definition", None)
-    if (
-        external is None
-        and (law is None or law.definition is not None)
-        and (reference is None or definition is not None)
-    ):
-        return _defined(group.definition, plain(inertia), law, definition)
-    return _library(group, inertia, law, reference, external)
+    moves = getattr(reference, "definition", None)
+    if loop.get("external") is None and (reference is None or moves is not None):
+        try:
+            return _defined(plain(loop), moves, kind)
+        except NoDefinitionError:  # a law written by hand
+            pass
+    return _made(loop, reference, kind)
 
 
 @lru_cache(maxsize=64)
-def _defined(group: Definition, inertia: Any, law: Kernel | None, reference: Definition | None) -> Library:
-    return _library(made_from(group), inertia, law, None if reference is None else made_from(reference), None)
+def _defined(loop: Definition, reference: Definition | None, kind: str) -> tuple[Loop, Library]:
+    arguments = {name: made_from(value) for name, value in loop.items()}
+    return _made(arguments, None if reference is None else made_from(reference), kind)
 
 
-def _library(
-    group: MatrixGroup, inertia: Any, law: Kernel | None, reference: Reference | None, external: ForceBody | None
-) -> Library:
-    kernels = [second_order_step(group, inertia, external, law=law)]
-    kernels += [law] if law is not None else []
+def _made(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Library]:
+    model = loop_model(**loop)
+    kernels: list[Kernel] = [make(model) for make in KINDS[kind]]
+    kernels += [loop_outputs(model)] if model.law is not None else []
     kernels += [reference_kernel(reference)] if reference is not None else []
-    return build_kernels(lambda: kernels, namespace=group.name, definition=defined_together(kernels))
+    library = build_kernels(lambda: kernels, namespace=model.plant.namespace, definition=defined_together(kernels))
+    return model, library
 
 
 def loop_numbers(
-    group: MatrixGroup, inertia: Any, law: Kernel | None, gains: Mapping[str, ArrayLike]
-) -> tuple[dict[str, Array], dict[str, Array], int | None]:
-    """The inputs of the step and of the law by name, and the number of loops that they are for; None for one.
+    loop: Loop, inertia: Any, gains: Mapping[str, ArrayLike], others: Mapping[str, ArrayLike]
+) -> tuple[dict[str, Array], int | None]:
+    """The numbers of a loop that are inputs by name, and the number of loops that they are for; None for one.
+
+    Args:
+        loop: the loop.
+        inertia: as `closed_loop` takes it.
+        gains: of the law and the observer.
+        others: limits, disturbance, sigma_X ..., bias: of one loop or, with an axis in front, of several.
 
     Raises:
         InputError: a number is missing, unknown or not positive; an inertia is not symmetric positive definite.
         ShapeError: an array fits neither one loop nor several, or two arrays are for different numbers of loops.
     """
-    n = group.dim
-    ports = {port.name: port for port in (law_parameters(law) if law is not None else ())}
-    unknown = [name for name in gains if name not in ports]
+    ports = {port.name: port for port in loop.number_ports(noisy=True) if port.name != "noise"}
+    body = {port.name: port for port in loop.plant.numbers}
+    of_law = {p.name: p for law in (loop.law, loop.observer) if law is not None for p in law.numbers}
+    unknown = [name for name in gains if name not in of_law]
     if unknown:
-        has = ", ".join(ports) or "none"
+        has = ", ".join(of_law) or "none"
         raise InputError(f"closed_loop: the law has no input {', '.join(unknown)}; its numbers that are inputs: {has}")
-    many = np.ndim(inertia) == 3 if not isinstance(inertia, str) else False
-    step: dict[str, Array] = {}
-    body = Port("inertia", (n, n))
-    if many:
-        metric = checked(body, inertia)
-        step = {"inertia": metric, "inertia_inverse": np.ascontiguousarray(np.linalg.inv(metric))}
+    if body and "inertia" in gains:
+        raise InputError("closed_loop: the inertia is one a loop already; the law takes that of the body")
     numbers: dict[str, Array] = {}
-    for name, port in ports.items():
+    if body:
+        metric = checked(body["inertia"], inertia)
+        numbers = {"inertia": metric, "inertia_inverse": np.ascontiguousarray(np.linalg.inv(metric))}
+    for name, port in of_law.items():
+        if name in numbers:
+            continue
         if name in gains:
             numbers[name] = checked(port, gains[name])
-        elif name == "inertia" and port.shape == (n, n) and inertia is not None:
-            numbers[name] = step.get("inertia", _single(inertia, n))
         else:
-            raise InputError(f"closed_loop: {name} is an input of the law: give gains={{{name!r}: ...}}")
-    if many and "inertia" in gains:
-        raise InputError("closed_loop: the inertia is one a loop already; the law takes that of the body")
-    step.update({name: value for name, value in numbers.items() if name not in step})
-    counts = {len(v) for name, v in step.items() if v.ndim > len(ports.get(name, body).shape)}
+            numbers[name] = _single(inertia, port.shape[0])
+    numbers |= {name: spread(ports[name], value) for name, value in others.items()}
+    counts = {len(value) for name, value in numbers.items() if value.ndim > len(ports[name].shape)}
     if len(counts) > 1:
         raise ShapeError(f"closed_loop: inertia and gains are for different numbers of loops: {sorted(counts)}")
-    return step, numbers, counts.pop() if counts else None
+    return numbers, counts.pop() if counts else None
+
+
+def spread(port: Port, value: ArrayLike) -> Array:
+    """A number for all components, one a component, or (N, components) for N loops.
+
+    Raises:
+        ShapeError, InputError, NotFiniteError: naming it.
+    """
+    what = {f"sigma_{kind}": f"noise[{kind!r}]" for kind in NOISE}.get(port.name, port.name)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"closed_loop: {what} is {value!r:.60}; give a number, {port.shape} or (N, {port.shape[0]})"
+        ) from None
+    if not np.all(np.isfinite(array)) and port.name != "limits":
+        raise NotFiniteError(f"closed_loop: {what} holds NaN or infinity")
+    if array.ndim > 2 or (array.ndim and array.shape[-1] not in (1, port.shape[0])):
+        raise ShapeError(
+            f"closed_loop: {what} has shape {array.shape}; give a number, {port.shape} or (N, {port.shape[0]})"
+        )
+    if port.name.startswith("sigma") and np.any(array < 0):
+        raise InputError(f"closed_loop: {what} is negative; it is a standard deviation")
+    if port.name == "limits" and not np.all(array > 0):
+        raise InputError("closed_loop: limits must be positive: the largest magnitude of each component of the command")
+    return np.ascontiguousarray(np.broadcast_to(array, (*array.shape[:-1], *port.shape)))
 
 
 def _single(inertia: Any, n: int) -> Array:
@@ -123,12 +157,19 @@ def checked(port: Port, value: ArrayLike) -> Array:
     return array
 
 
-def several(start: Array, loops: int) -> Array:
-    """(N, m) initial states for that many loops.
+def several(start: Array, many: bool, loops: int | None, runs: Any) -> tuple[Array, bool]:
+    """(N, m) initial states for as many loops as the numbers and `runs` ask for, and whether there are several.
 
     Raises:
-        ShapeError: there are several already, and not as many.
+        ShapeError: two numbers of loops. InputError: runs is no positive integer.
     """
-    if len(start) not in (1, loops):
-        raise ShapeError(f"closed_loop: {len(start)} initial states for {loops} inertias or gains")
-    return np.ascontiguousarray(np.broadcast_to(start, (loops, start.shape[1])))
+    if runs is not None and (isinstance(runs, bool) or not isinstance(runs, int | np.integer) or runs < 1):
+        raise InputError(f"closed_loop: runs is a positive integer, given {runs!r}")
+    if loops is not None and runs is not None and loops != runs:
+        raise ShapeError(f"closed_loop: {runs} runs, and inertia, gains or noise for {loops} loops")
+    wanted = loops if loops is not None else runs
+    if wanted is None:
+        return start, many
+    if len(start) not in (1, wanted):
+        raise ShapeError(f"closed_loop: {len(start)} initial states for {wanted} inertias or gains")
+    return np.ascontiguousarray(np.broadcast_to(start, (int(wanted), start.shape[1]))), True

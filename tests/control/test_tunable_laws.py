@@ -136,11 +136,13 @@ def test_what_is_missing_or_wrong_is_named() -> None:
 
 def test_a_repeated_loop_is_known_by_its_definition() -> None:
     from lie_codegen.control.loop_library import loop_library
+    from lie_codegen.control.plants import group_plant
 
     so3 = lc.group("so3")
 
     def lib(k_p: Any) -> Any:
-        return loop_library(so3, (1, 2, 2), lc.attitude_law("pd", inertia=(1, 2, 2), k_p=k_p, k_d=6), None, None)
+        law = lc.attitude_law("pd", inertia=(1, 2, 2), k_p=k_p, k_d=6)
+        return loop_library({"plant": group_plant(so3, (1, 2, 2)), "law": law}, None, "continuous")[1]
 
     assert lib(4) is lib("4")
     assert lib(4) is not lib(5)

@@ -1,0 +1,322 @@
+"""The arguments of `lc.closed_loop`, read and checked: what is compiled, what are numbers, when things happen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.arrays import Array
+from lie_codegen.control.loop_model import NOISE
+from lie_codegen.control.loop_ports import LoopLaw, moving_law, read_law
+from lie_codegen.control.plants import Plant, group_plant
+from lie_codegen.control.reference_kernels import reference as make_reference
+from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.groups.catalogue_load import as_group
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.definition import plain
+from lie_codegen.kernel.kernel import Kernel
+
+_RTOL = 1e-10
+#: Relative distance from a whole number of samples or steps that is rounding.
+_WHOLE = 1e-6
+
+
+@dataclass(frozen=True)
+class LoopArguments:
+    """What `closed_loop` was told.
+
+    Attributes:
+        model: arguments of `loop_model`.
+        kind: which kernels are needed, of `loop_library.KINDS`.
+        reference: or None.
+        times: (k,) equally spaced.
+        inertia: as given.
+        numbers: limits, disturbance, sigma_X ..., bias that were given, by name.
+        start: of own states, as the law and the observer say.
+        sample: [s]; None for a law that acts continuously.
+        delay: whole samples.
+        step: [s] or None.
+        parts: steps between two times, or between two samples, for a given step.
+        rtol: for no step.
+    """
+
+    model: dict[str, Any]
+    kind: str
+    reference: Any
+    times: Array
+    inertia: Any
+    numbers: dict[str, Any]
+    start: dict[str, Any]
+    sample: float | None
+    delay: int
+    step: float | None
+    parts: int
+    rtol: float
+
+
+def loop_arguments(
+    group: Any,
+    *,
+    law: Any,
+    inertia: Any,
+    reference: Any,
+    t: ArrayLike,
+    rtol: float | None,
+    tolerance: float | None,
+    step: float | None,
+    sample: float | None,
+    delay: float | None,
+    noise: Any,
+    limits: Any,
+    disturbance: Any,
+    external: Any,
+    observer: Any,
+    gains: Any,
+) -> LoopArguments:
+    """See `closed_loop`.
+
+    Raises:
+        InputError, ShapeError, NotFiniteError: naming the argument.
+    """
+    if gains is not None and not isinstance(gains, Mapping):
+        raise InputError(f"closed_loop: gains is a mapping such as {{'k_p': 4}}, got {gains!r:.60}")
+    times = _times(t)
+    read, watching = read_law(law), read_law(observer, observer=True)
+    plant = _plant(group, read, inertia)
+    for port in (each for law in (read, watching) if law is not None for each in law.numbers):
+        if port.name not in (gains or {}) and (port.name != "inertia" or inertia is None):
+            raise InputError(
+                f"closed_loop: {port.name} is an input of the law: give gains={{{port.name!r}: ...}}; were it a state z of the "
+                "law, there would be an output z_dot or z_next"
+            )
+    moves = _reference(plant, reference)
+    if read is not None:
+        read = _following(read, plant, moves)
+    numbers: dict[str, Any] = {}
+    kinds, biased = _noise(noise, numbers, read, watching, plant)
+    if limits is not None:
+        numbers["limits"] = limits
+    if callable(disturbance) and not isinstance(disturbance, Kernel):
+        if external is not None:
+            raise InputError("closed_loop: give a function as disturbance or as external, not both")
+        disturbance, external = None, disturbance
+    formulas = _disturbance(disturbance, numbers)
+    told = _sampling(times, step, sample, delay, (*kinds, *(["bias"] if biased else [])), watching)
+    if read is None and (told[0] is not None or limits is not None or watching is not None):
+        raise InputError("closed_loop: sample, delay, noise, limits and observer are of a law: give law=")
+    goal = _tolerance(rtol, tolerance, step)
+    seconds, late = told
+    parts = 1
+    if step is not None:
+        gap = float(times[1] - times[0]) if seconds is None else seconds
+        parts = max(1, int(np.ceil(gap / step - 1e-9)))
+    kind = "continuous" if seconds is None else "sampled" if step is not None and parts == 1 and not late else "held"
+    model = {
+        "plant": plant,
+        "law": None if read is None else read.kernel,
+        "directions": None if read is None else read.directions or None,
+        "moving": moves is not None,
+        "limited": limits is not None,
+        "disturbance": formulas,
+        "external": external,
+        "noise": kinds,
+        "biased": biased,
+        "observer": None if watching is None else watching.kernel,
+        "seen": None if watching is None else watching.directions or None,
+    }
+    start = {**(read.start if read is not None else {}), **(watching.start if watching is not None else {})}
+    return LoopArguments(model, kind, moves, times, inertia, numbers, start, seconds, late, step, parts, goal)
+
+
+def _times(t: ArrayLike) -> Array:
+    try:
+        times = np.asarray(t, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"closed_loop: t must be an array of numbers, got {t!r:.60}") from None
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)):
+        raise ShapeError(f"closed_loop: t has shape {times.shape}; give at least two finite times")
+    gaps = np.diff(times)
+    if gaps[0] <= 0 or np.max(np.abs(gaps - gaps[0])) > 1e-9 * abs(gaps[0]) * len(times):
+        raise InputError("closed_loop: t must increase in equal steps, as numpy.linspace gives them")
+    return times
+
+
+def _plant(group: Any, law: LoopLaw | None, inertia: Any) -> Plant:
+    if hasattr(group, "loop_plant"):
+        made: Plant = group.loop_plant(inertia=inertia)
+        return made
+    if group is None:
+        if law is None:
+            raise InputError(
+                "closed_loop: no group; it takes a group (or the law of one), inertia, law, reference, X0, xi0, t"
+            )
+        group = law.kernel.namespace
+    group = as_group(group, "closed_loop")
+    if law is None or law.order == 2 or (law.order is None and inertia is not None):
+        several = not isinstance(inertia, str) and np.ndim(inertia) == 3
+        return group_plant(group, "input") if several else _known_plant(group, plain(inertia))
+    if law.order is None:
+        raise InputError(
+            f"closed_loop: is {law.command.name} of the law {law.kernel.name} a velocity or a force? Name it omega or velocity, "
+            "force or torque; or give inertia= of the body that it pushes"
+        )
+    return group_plant(group, order=1)
+
+
+@lru_cache(maxsize=64)
+def _known_plant(group: MatrixGroup, inertia: Any) -> Plant:
+    return group_plant(group, inertia)
+
+
+def _reference(plant: Plant, reference: Any) -> Any:
+    """A reference of the plant's group, made from what `lc.reference` takes."""
+    if reference is None:
+        return None
+    group = getattr(plant, "group", None)
+    if group is None:
+        raise InputError(f"closed_loop: no reference is known for {plant.namespace}")
+    theirs = getattr(reference, "group", None)
+    made = hasattr(reference, "definition") or not (
+        isinstance(reference, list | tuple) or all(hasattr(reference, name) for name in ("X", "u", "duration"))
+    )
+    if theirs is not None and theirs != group:
+        raise InputError(f"the reference is one of {theirs.name}, not of {group.name}")
+    if not made:
+        return make_reference(group, reference)
+    if theirs is None:
+        raise InputError(
+            f"closed_loop: reference is what lc.reference makes, a plan, or formulas of t, one a component; got {reference!r:.60}"
+        )
+    return reference
+
+
+def _following(law: LoopLaw, plant: Plant, reference: Any) -> LoopLaw:
+    """The law as it goes with a reference, or without."""
+    name = law.kernel.name
+    if reference is None:
+        if law.has("reference"):
+            raise InputError(f"the law {name} tracks: give it a reference")
+        return law
+    if plant.order == 2:
+        law = moving_law(law)
+    if not law.has("reference") and plant.order == 2:
+        raise InputError(
+            f"closed_loop: the law {name} reads no reference: its inputs are {', '.join(p.name for p in law.ports)}; leave "
+            "reference= away, or give a law that reads X_d, xi_d, xi_d_dot"
+        )
+    return law
+
+
+def _noise(
+    noise: Any, numbers: dict[str, Any], law: LoopLaw | None, observer: LoopLaw | None, plant: Plant
+) -> tuple[tuple[str, ...], bool]:
+    if noise is None:
+        return (), False
+    known = (*NOISE, "bias")
+    if not isinstance(noise, Mapping):
+        raise InputError(
+            f"closed_loop: noise is a mapping such as {{'X': 0.01, 'xi': 0.001, 'u': 0}}, got {noise!r:.60}"
+        )
+    unknown = [str(name) for name in noise if name not in known]
+    if unknown:
+        raise InputError(f"closed_loop: no noise on {', '.join(unknown)}; it goes on {', '.join(known)}")
+    sees = (observer if observer is not None else law) is not None and (
+        (observer is not None and observer.has("direction")) or (law is not None and law.has("direction"))
+    )
+    if "y" in noise and not sees:
+        raise InputError("closed_loop: noise on y, which neither the law nor an observer reads")
+    if plant.order == 1 and observer is None and {"xi", "bias"} & set(noise):
+        raise InputError("closed_loop: noise on xi, which a loop whose law commands the velocity does not measure")
+    for name, value in noise.items():
+        numbers["bias" if name == "bias" else f"sigma_{name}"] = value
+    return tuple(kind for kind in NOISE if kind in noise), "bias" in noise
+
+
+def _disturbance(disturbance: Any, numbers: dict[str, Any]) -> Any:
+    """What is compiled: formulas, a kernel, or "input" for constants, which go to the numbers."""
+    if disturbance is None or isinstance(disturbance, Kernel):
+        return disturbance
+    if isinstance(disturbance, str):
+        raise InputError(f"closed_loop: disturbance is one formula a component, got the text {disturbance!r:.60}")
+    listed = isinstance(disturbance, Sequence) and all(
+        isinstance(each, str) or _is_number(each) for each in disturbance
+    )
+    if listed and any(isinstance(each, str) for each in disturbance):
+        return tuple(each if isinstance(each, str) else float(each) for each in disturbance)
+    try:
+        numbers["disturbance"] = np.asarray(disturbance, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"closed_loop: disturbance is formulas of t, X and xi, one a component, constants, or a Kernel; got {disturbance!r:.60}"
+        ) from None
+    return "input"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+
+
+def _sampling(
+    times: Array,
+    step: float | None,
+    sample: float | None,
+    delay: float | None,
+    noise: Sequence[str],
+    observer: LoopLaw | None,
+) -> tuple[float | None, int]:
+    """Seconds between two calls of the law, None for a continuous one, and the delay in samples."""
+    for name, value in (("step", step), ("sample", sample)):
+        if value is not None and not (_is_number(value) and np.isfinite(value) and value > 0):
+            raise InputError(f"closed_loop: {name} is a positive number of seconds, got {value!r:.60}")
+    asked = [f"noise on {', '.join(noise)}"] if noise else []
+    asked += ["a delay"] if delay else []
+    asked += ["an observer"] if observer is not None else []
+    if sample is None:
+        if not asked:
+            return None, 0
+        if step is None:
+            raise InputError(
+                f"closed_loop: {' and '.join(asked)} needs sample=, the seconds from one call of the law to the next"
+            )
+        sample = step
+    gap = float(times[1] - times[0])
+    count = round(gap / sample)
+    if count < 1 or abs(gap / sample - count) > _WHOLE * count:
+        raise InputError(
+            f"closed_loop: the times t are {gap:g} s apart, which is no multiple of sample = {sample:g}; choose t so that it is"
+        )
+    sample = gap / count
+    if delay is None:
+        return sample, 0
+    if not _is_number(delay) or not np.isfinite(delay) or delay < 0:
+        raise InputError(
+            f"closed_loop: delay is a number of samples (an int) or of seconds (a float), got {delay!r:.60}"
+        )
+    if isinstance(delay, int | np.integer):
+        return sample, int(delay)
+    late = round(float(delay) / sample)
+    if abs(float(delay) / sample - late) > _WHOLE * max(1, late):
+        raise InputError(f"closed_loop: delay = {delay:g} s is no multiple of sample = {sample:g} s")
+    return sample, late
+
+
+def _tolerance(rtol: float | None, tolerance: float | None, step: float | None) -> float:
+    if rtol is not None and tolerance is not None:
+        raise InputError("closed_loop: give rtol, or its old name tolerance, not both")
+    name, value = ("rtol", rtol) if rtol is not None else ("tolerance", tolerance)
+    if value is not None and step is not None:
+        raise InputError(f"closed_loop: step = {step:g} and {name}: give the step or the tolerance, not both")
+    if value is None:
+        return _RTOL
+    if not _is_number(value):
+        raise InputError(f"closed_loop: {name} is a positive number, got {value!r:.60}")
+    if not np.isfinite(value):
+        raise NotFiniteError(f"closed_loop: {name} is {value}; give a positive number")
+    if value <= 0:
+        raise InputError(f"closed_loop: {name} must be positive, got {value!r}")
+    return float(value)
