@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.curve_reference import CurveReference, check_curve
 from lie_codegen.control.disturbance import ForceBody
 from lie_codegen.control.loop_arguments import LoopArguments, loop_arguments
 from lie_codegen.control.loop_error import loop_error
@@ -238,7 +239,11 @@ def closed_loop(
     loop, library = loop_library(told.model, told.reference, told.kind)
     numbers, loops = loop_numbers(loop, told.inertia, gains or {}, told.numbers)
     if told.reference is not None:
-        check_reference(told.reference, float(told.times[0]), float(told.times[-1]), library.reference)
+        ends = float(told.times[0]), float(told.times[-1])
+        if isinstance(told.reference, CurveReference):
+            check_curve(told.reference, *ends, library.reference.batch)
+        else:
+            check_reference(told.reference, *ends, library.reference)
     start, many = loop.plant.starts(X0, xi0)
     start, many = several(start, many, loops, runs)
     start = initial_own(loop, start, {**told.start, **(states or {})})

@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.curve_reference import CurveReference, curve_reference
 from lie_codegen.control.loop_model import NOISE
 from lie_codegen.control.loop_ports import LoopLaw, moving_law, read_law
-from lie_codegen.control.plants import Plant, group_plant
+from lie_codegen.control.plants import GroupPlant, Plant, group_plant
 from lie_codegen.control.reference_kernels import reference as make_reference
+from lie_codegen.control.space_plants import named_plant, vibrated
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import plain
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
 
 _RTOL = 1e-10
 #: Relative distance from a whole number of samples or steps that is rounding.
@@ -86,8 +89,12 @@ def loop_arguments(
     if gains is not None and not isinstance(gains, Mapping):
         raise InputError(f"closed_loop: gains is a mapping such as {{'k_p': 4}}, got {gains!r:.60}")
     times = _times(t)
+    designed = None
+    if isinstance(law, VibrationalFeedback):
+        designed, law, period = vibrated(law)
+        sample = period if sample is None else sample
     read, watching = read_law(law), read_law(observer, observer=True)
-    plant = _plant(group, read, inertia)
+    plant = _plant(group, read, inertia) if designed is None else designed
     for port in (each for law in (read, watching) if law is not None for each in law.numbers):
         if port.name not in (gains or {}) and (port.name != "inertia" or inertia is None):
             raise InputError(
@@ -150,6 +157,9 @@ def _plant(group: Any, law: LoopLaw | None, inertia: Any) -> Plant:
     if hasattr(group, "loop_plant"):
         made: Plant = group.loop_plant(inertia=inertia)
         return made
+    other = named_plant(group, None if law is None else law.kernel, inertia, None if law is None else law.order)
+    if other is not None:
+        return other
     if group is None:
         if law is None:
             raise InputError(
@@ -179,7 +189,12 @@ def _reference(plant: Plant, reference: Any) -> Any:
         return None
     group = getattr(plant, "group", None)
     if group is None:
-        raise InputError(f"closed_loop: no reference is known for {plant.namespace}")
+        curve = reference if isinstance(reference, CurveReference) else _curve(plant, reference)
+        if len(curve.r) != plant.ports[0].shape[0]:
+            raise InputError(
+                f"closed_loop: the reference has {len(curve.r)} coordinates, {plant.namespace} {plant.ports[0].shape[0]}"
+            )
+        return curve
     theirs = getattr(reference, "group", None)
     made = hasattr(reference, "definition") or not (
         isinstance(reference, list | tuple) or all(hasattr(reference, name) for name in ("X", "u", "duration"))
@@ -195,6 +210,14 @@ def _reference(plant: Plant, reference: Any) -> Any:
     return reference
 
 
+def _curve(plant: Plant, reference: Any) -> CurveReference:
+    if not isinstance(reference, list | tuple):
+        raise InputError(
+            f"closed_loop: the reference of {plant.namespace} is one formula of t a coordinate, got {reference!r:.60}"
+        )
+    return curve_reference(reference, sphere=bool(getattr(plant, "sphere", False)))
+
+
 def _following(law: LoopLaw, plant: Plant, reference: Any) -> LoopLaw:
     """The law as it goes with a reference, or without."""
     name = law.kernel.name
@@ -204,7 +227,7 @@ def _following(law: LoopLaw, plant: Plant, reference: Any) -> LoopLaw:
         return law
     if plant.order == 2:
         law = moving_law(law)
-    if not law.has("reference") and plant.order == 2:
+    if not law.has("reference") and (plant.order == 2 or not isinstance(plant, GroupPlant)):
         raise InputError(
             f"closed_loop: the law {name} reads no reference: its inputs are {', '.join(p.name for p in law.ports)}; leave "
             "reference= away, or give a law that reads X_d, xi_d, xi_d_dot"

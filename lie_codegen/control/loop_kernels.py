@@ -69,7 +69,7 @@ def loop_step(loop: Loop, name: str = "loop_step") -> Kernel:
         moving = len(w)
         turned = [each for each in own if each.kind == "group"]
         flat = [x for each in own if each.kind == "vector" for x in each.value]
-        moves = [*plant.moves, *(loop.own_move for _ in turned)]
+        moves = [*plant.moves, *(plant.moves[0] for _ in turned)]
         ends, after = product_step(ops, moves, [*elements, *(each.value for each in turned)], [*w, *flat], rates, t, h)
         X, v = plant.landed(ops, *plant.joined(ends[: len(elements)], after[:moving]))
         own = loop.replaced(own, ends[len(elements) :], after[moving:])
@@ -278,7 +278,7 @@ def _seen(ops: Arithmetic, loop: Loop, X: Any, noise: Vector | None) -> Any:
         off = plus(row, noise[place : place + len(row)])
         place += len(row)
         if rotations and len(c) == loop.plant.group.degree:
-            length = ops.constant(sp.sqrt(sum(sp.sympify(entry) ** 2 for entry in c)))
+            length = ops.constant(sp.sqrt(sum((entry**2 for entry in c), sp.S.Zero)))
             off = scaled(length / ops.sqrt(dot(off, off)), off)
         found.append(off)
     return found

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.curve_reference import CurveReference, curve_kernel
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
 from lie_codegen.control.loop_model import NOISE, Loop, loop_model
 from lie_codegen.control.reference_kernels import reference_kernel
@@ -52,7 +53,10 @@ def _made(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Lib
     model = loop_model(**loop)
     kernels: list[Kernel] = [make(model) for make in KINDS[kind]]
     kernels += [loop_outputs(model)] if model.law is not None else []
-    kernels += [reference_kernel(reference)] if reference is not None else []
+    if reference is not None:
+        kernels.append(
+            curve_kernel(reference) if isinstance(reference, CurveReference) else reference_kernel(reference)
+        )
     library = build_kernels(lambda: kernels, namespace=model.plant.namespace, definition=defined_together(kernels))
     return model, library
 

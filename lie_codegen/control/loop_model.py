@@ -93,9 +93,9 @@ class Loop:
         return watching.directions if watching is not None else ()
 
     @cached_property
-    def own_move(self) -> Move:
+    def own_move(self) -> Move | None:
         """Of states on the group."""
-        return self.plant.moves[0]
+        return self.plant.moves[0] if self.plant.moves else None
 
     def is_element(self, port: Port) -> bool:
         """Whether a state is an element of the group, kept by its varying entries."""

@@ -104,11 +104,16 @@ def formula_reference(group: MatrixGroup, coordinates: Sequence[Any], *, start: 
     if isinstance(coordinates, str) or len(coordinates) != group.dim:
         raise InputError(f"a reference on {group.name} needs {group.dim} formulas, for {', '.join(group.labels)}")
     return FormulaReference(
-        group, tuple(_formula(entry) for entry in coordinates), None if start is None else np.array(start)
+        group, tuple(formula_of_time(entry) for entry in coordinates), None if start is None else np.array(start)
     )
 
 
-def _formula(entry: Any) -> sp.Expr:
+def formula_of_time(entry: Any) -> sp.Expr:
+    """A text or an expression of t, twice differentiable.
+
+    Raises:
+        InputError: a symbol other than t, or abs. ExpressionError: a text outside the grammar.
+    """
     if isinstance(entry, str):
         formula = parse_expression(entry, {"t": TIME, "pi": sp.pi}, FORMULA_FUNCTIONS)
         if formula.has(sp.Abs):
