@@ -183,6 +183,7 @@ from .steering import Pointing as Pointing
 from .steering import Position as Position
 from .steering import Status as Status
 from .steering import UpToPhase as UpToPhase
+from .steering import momentum_wheels as momentum_wheels
 from .steering import mpc as mpc
 from .steering import ocp as ocp
 from .steering import qutip_evolution as qutip_evolution

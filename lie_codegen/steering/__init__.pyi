@@ -13,3 +13,4 @@ from .plan import Plan as Plan
 from .plan import Status as Status
 from .qutip_export import qutip_evolution as qutip_evolution
 from .shooting.shooter import shooter as shooter
+from .wheels.system import momentum_wheels as momentum_wheels
