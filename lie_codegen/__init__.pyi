@@ -153,6 +153,7 @@ from .mechanics import vibrational_kernels as vibrational_kernels
 
 # pictures
 from .pictures import plot_plan as plot_plan
+from .pictures import view as view
 
 # rigid_body
 from .rigid_body import elliptic_kernels as elliptic_kernels

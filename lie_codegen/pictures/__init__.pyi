@@ -1,3 +1,4 @@
 """Pictures of plans, runs and averages."""
 
 from .plot_plan import plot_plan as plot_plan
+from .view import view as view

@@ -1,0 +1,101 @@
+"""The steering solver of a page: the generated C, compiled to WebAssembly, in the page as text."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.errors import InputError, MissingDependencyError
+from lie_codegen.flow.libraries import logarithms
+from lie_codegen.groups.build import generate
+from lie_codegen.pictures.scene import motion_of
+from lie_codegen.steering.plan import Plan
+
+_POINTS = 201
+_MOST_SIZE = 25
+#: A machine under load needs minutes for the first compilation, in which zig makes its C library.
+_SECONDS = 900
+
+_WRAPPER = """#include "{prefix}.h"
+#define EXPORT(name) __attribute__((export_name(name)))
+static double target[{size}], weights[{controls}], u[{points} * {controls}], X[{points} * {size}];
+static {prefix}_result result;
+EXPORT("lie_target") double *lie_target(void) {{ return target; }}
+EXPORT("lie_weights") double *lie_weights(void) {{ return weights; }}
+EXPORT("lie_u") double *lie_u(void) {{ return u; }}
+EXPORT("lie_X") double *lie_X(void) {{ return X; }}
+EXPORT("lie_cost") double *lie_cost(void) {{ return &result.cost; }}
+EXPORT("lie_solve") int lie_solve(void)
+{{
+    {prefix}_options options = {prefix}_defaults();
+    {prefix}_solve(1, target, weights, &options, &result);
+    {prefix}_sample(result.mu0, weights, {points}, u, X);
+    return result.status;
+}}
+"""
+
+
+def page_solver(plan: Any) -> dict[str, Any]:
+    """What the page needs to solve again: the solver in WebAssembly (base64), the basis, the target's logarithm.
+
+    Raises:
+        InputError: what is shown is no plan of least energy, or of a group that the page cannot move.
+        MissingDependencyError: no ziglang.
+        CodegenError: as `lc.generate`.
+    """
+    if not isinstance(plan, Plan) or plan.method != "optimal" or plan.group.is_complex:
+        raise InputError('view: solve=True takes a plan of method="optimal" on a real group')
+    group = plan.group
+    if motion_of(group, np.asarray(plan.target)[None]).kind == "point" or group.degree**2 > _MOST_SIZE:
+        raise InputError(f"view: the page moves rotations and poses; {group.name} has others")
+    if importlib.util.find_spec("ziglang") is None:
+        raise MissingDependencyError(
+            "view: solve=True compiles with ziglang: install lie_codegen with its extra, lie_codegen[zig]"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        package = generate(group, Path(folder) / "package", steering=plan.controls) / "steering"
+        header = next((package / "include").glob("*.h"))
+        wrapper = package / "src" / "page.c"
+        shape = {"prefix": header.stem, "size": group.degree**2, "controls": len(plan.controls), "points": _POINTS}
+        wrapper.write_text(_WRAPPER.format(**shape), encoding="utf-8")
+        binary = _compiled(package)
+    x = logarithms(group).log(np.asarray(plan.target, dtype=float))
+    weights = plan.details.get("weights")
+    return {
+        "kind": "steer",
+        "wasm": base64.b64encode(binary).decode(),
+        "points": _POINTS,
+        "controls": len(plan.controls),
+        "duration": plan.duration,
+        "weights": np.ones(len(plan.controls)).tolist()
+        if weights is None
+        else np.asarray(weights, dtype=float).tolist(),
+        "basis": group.basis.tolist(),
+        "labels": list(group.labels),
+        "units": list(group.units),
+        "target": np.asarray(x).tolist(),
+        "plane": motion_of(group, np.asarray(plan.target)[None]).kind == "plane",
+    }
+
+
+def _compiled(package: Path) -> bytes:
+    out = package / "page.wasm"
+    sources = [str(path) for path in sorted((package / "src").glob("*.c"))]
+    command = [
+        sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi", "-O2", "-s", "-mexec-model=reactor",
+        f"-I{package / 'include'}", f"-I{package / 'src'}", *sources, "-o", str(out),
+    ]  # fmt: skip
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(f"view: the compiler of the page's solver took more than {_SECONDS} s") from None
+    if done.returncode or not out.is_file():
+        raise InputError(f"view: the page's solver does not compile: {done.stderr.strip()[-400:]}")
+    return out.read_bytes()

@@ -1,0 +1,219 @@
+"""The page that moves: its numbers are Python's, it holds nothing from elsewhere, and a browser shows it without an error."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import json
+import re
+import shutil
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import command_line
+import numpy as np
+import pytest
+
+import lie_codegen as lc
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+def data_of(page: Path) -> Any:
+    found = re.search(
+        r'<script id="data" type="application/json">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL
+    )
+    assert found is not None
+    return json.loads(found.group(1))
+
+
+@pytest.fixture(scope="module")
+def plan() -> lc.Plan:
+    return lc.steer("so3", [0.5, -0.3, 0.9], ("w1", "w2"), 24.0)
+
+
+def test_a_plan(plan: lc.Plan, tmp_path: Path) -> None:
+    cone = lc.Cone((0, 0, 1), (1, 0, 1), 0.3)
+    page = lc.view(plan, tmp_path / "p.html", body="satellite", obstacles=[cone], title="A <slew> & more", samples=51)
+    data = data_of(page)
+    t = np.linspace(0, 24, 51)
+    assert np.array_equal(data["t"], t)
+    assert np.array_equal(np.reshape(data["motions"][0]["R"], (51, 3, 3)), plan.X(t))
+    assert np.array_equal(np.transpose(data["series"][0]["values"]), plan.inputs(t))
+    assert data["cones"][0]["angle"] == 0.3
+    text = page.read_text(encoding="utf-8")
+    assert "<title>A &lt;slew&gt; &amp; more</title>" in text
+    # nothing comes from elsewhere
+    assert not re.search(r"(src|href)\s*=|https?://|@import|url\(", text)
+
+
+def test_poses_planes_and_points(tmp_path: Path) -> None:
+    for name in ("se2", "se3", "h3", "su2"):
+        group = lc.group(name)
+        u = [f"cos(t + {i})/2" for i in range(group.dim)]
+        run = lc.simulate(name, u, t=np.linspace(0, 3, 31))
+        data = data_of(lc.view(run, tmp_path / f"{name}.html"))
+        motion = data["motions"][0]
+        R = np.reshape(motion["R"], (31, 3, 3))
+        assert np.max(np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3))) < 1e-12
+        if name == "se3":
+            assert np.array_equal(np.reshape(motion["p"], (31, 3)), run.X[:, :3, 3])
+        if name == "se2":
+            assert np.array_equal(np.reshape(motion["p"], (31, 3))[:, :2], run.X[:, :2, 2])
+
+
+def test_a_closed_loop_and_its_reference(tmp_path: Path) -> None:
+    reference = lc.reference("so3", ["t/4", "0", "sin(t)/5"])
+    law = lc.tracking_law("so3", inertia=[1, 2, 3], error="so3_right", gains={"K_p": [4, 4, 4], "K_d": 3})
+    run = lc.closed_loop("so3", inertia=[1, 2, 3], law=law, reference=reference, t=np.linspace(0, 5, 26), step=0.05)
+    data = data_of(lc.view(run, tmp_path / "l.html", group="so3"))
+    assert np.array_equal(np.reshape(data["motions"][1]["R"], (26, 3, 3)), run.X_d)
+
+
+def test_a_body_of_ones_own(plan: lc.Plan, tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]], dtype="<f4")
+    order = np.array([0, 1, 2, 0, 1, 3, 0, 2, 3], dtype="<u2")
+    raw = points.tobytes() + order.tobytes()
+    record: dict[str, Any] = {
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "scale": [1, 1, 3]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 9, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 18}],
+        "buffers": [{"byteLength": len(raw), "uri": "data:application/octet-stream;base64," + base64.b64encode(raw).decode()}],
+    }  # fmt: skip
+    (tmp_path / "b.gltf").write_text(json.dumps(record))
+    faces = np.array(data_of(lc.view(plan, tmp_path / "g.html", body=tmp_path / "b.gltf"))["faces"])
+    assert faces.shape == (3, 3, 3)
+    assert np.allclose(faces[1, 2], [0, 0, 1])
+    # the same as one binary file
+    del record["buffers"][0]["uri"]
+    text = json.dumps(record).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(raw), 0x004E4942) + raw
+    (tmp_path / "b.glb").write_bytes(struct.pack("<III", 0x46546C67, 2, 12 + len(body)) + body)
+    assert np.array_equal(
+        np.array(data_of(lc.view(plan, tmp_path / "h.html", body=tmp_path / "b.glb"))["faces"]), faces
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"path": "p.png"}, "html"),
+        ({"body": "cube"}, "body is one of"),
+        ({"body": "none.glb"}, "cannot be read"),
+        ({"samples": 1}, "samples"),
+        ({"what": 3}, "a page shows"),
+    ],
+)
+def test_what_is_refused(plan: lc.Plan, tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    what = change.pop("what", plan)
+    path = tmp_path / change.pop("path", "p.html")
+    with pytest.raises(lc.errors.InputError, match=said):
+        lc.view(what, path, **change)
+    assert not path.exists()
+
+
+def test_the_command(tmp_path: Path) -> None:
+    done = command_line.run(
+        "page", "se2", "--controls", "omega,vx", "--still", "--out", "q.html", "--json", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert data_of(tmp_path / "q.html")["motions"][0]["kind"] == "plane"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium")
+    quiet = [
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+    ]
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM, args=quiet)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def tab(browser: Any) -> Iterator[Any]:
+    context = browser.new_context(viewport={"width": 1000, "height": 900}, has_touch=True)
+    page, errors = context.new_page(), []
+    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    yield page
+    context.close()
+    assert errors == []
+
+
+def test_in_a_browser(plan: lc.Plan, tmp_path: Path, tab: Any) -> None:
+    tab.goto(lc.view(plan, tmp_path / "p.html", body="satellite", samples=51).as_uri())
+    t = np.linspace(0, 24, 51)
+    for i in (0, 20, 50):
+        pose = tab.evaluate(f"lieView.pose({i})")
+        assert pose["t"] == t[i]
+        assert np.array_equal(np.reshape(pose["R"], (3, 3)), plan.X(t)[i])
+    before = tab.locator("#space").screenshot()
+    tab.locator("#time").fill("30")
+    assert tab.evaluate("lieView.place") == 30
+    tab.locator("#space").focus()
+    tab.keyboard.press("ArrowLeft")
+    assert tab.locator("#space").screenshot() != before
+    tab.locator("#plots").tap(position={"x": 200, "y": 60})
+    assert 0 < tab.evaluate("lieView.place") < 30
+    tab.locator("#play").click()
+    tab.wait_for_function("lieView.place > 0 && document.getElementById('play').textContent === 'Pause'")
+    for width in (320, 1200):
+        tab.set_viewport_size({"width": width, "height": 800})
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("name", ["so3", "se2", "se3", "su2"])
+def test_the_page_of_an_average_integrates_as_python_does(tmp_path: Path, tab: Any, name: str) -> None:
+    texts = ["cos(t)", "sin(t)/2", "cos(2*t)/3 + 1/5", "sin(t)/4", "0", "cos(t)/5"][: lc.group(name).dim]
+    u = lc.PeriodicInput(texts)
+    average = lc.average(name, u, order=3)
+    tab.goto(lc.view(average, tmp_path / "a.html").as_uri())
+    eps = 0.1
+    found = tab.evaluate(
+        f"(() => {{ const s = lieAverage.states({eps}); return [s.actual.at(-1), s.mean.at(-1), s.h]; }})()"
+    )
+    T = 12 * 2 * np.pi
+    actual, mean = lc.simulate(name, u, t=[0, T], eps=eps, rtol=1e-12).X[-1], average.state(eps, np.array([T]))[0]
+    if name == "su2":
+        group = lc.group(name)
+        actual, mean = (
+            np.stack([group.vee(X @ b @ np.linalg.inv(X)) for b in group.basis], axis=1) for X in (actual, mean)
+        )
+    assert np.max(np.abs(np.array(found[0]) - actual)) < 1e-7  # 64 steps a period of a method of order 4
+    assert np.max(np.abs(np.array(found[1]) - mean)) < 1e-12
+    tab.locator("#eps").fill("0.4")
+    assert tab.locator("#eps_now").inner_text() == "0.40"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="no ziglang")
+@pytest.mark.parametrize("name", ["so3", "se2"])
+def test_the_solver_in_the_page_gives_the_digits_of_python(tmp_path: Path, tab: Any, name: str) -> None:
+    group = lc.group(name)
+    controls = group.labels[:2]
+    plan = lc.steer(name, [0.5, -0.3, 0.9], controls, 8.0, "optimal")
+    tab.goto(lc.view(plan, tmp_path / "s.html", solve=True).as_uri())
+    log = lc.build(name).log
+    for target in ([0.5, -0.3, 0.9], [0.2, 0.4, -0.6], [-0.8, 0.1, 0.3]):
+        other = lc.steer(name, target, controls, 8.0, "optimal")
+        x = np.asarray(log(np.asarray(other.target))).tolist()
+        found = tab.evaluate(f"(() => {{ const r = lieSolver.solve({x}); return [r.status, r.cost, r.X]; }})()")
+        assert found[0] == 1
+        assert found[1] == pytest.approx(other.cost, rel=1e-12)
+        assert np.max(np.abs(np.reshape(found[2], (201, group.degree, group.degree))[-1] - other.target)) < 1e-10
