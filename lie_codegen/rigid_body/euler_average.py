@@ -12,15 +12,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.averaging.near_identity import GOOD, to_mean
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
-from lie_codegen.kernel.elliptic import nome
+from lie_codegen.kernel.elliptic import LARGEST_MODULUS, nome
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.rigid_body import euler_kernels
+from lie_codegen.rigid_body.euler_second_order import (
+    MARGIN,
+    EulerSolution,
+    MeanMotion,
+    NearIdentity,
+    SecondOrder,
+    inside,
+    second_order_kernels,
+)
 from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_perturbation
-from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, check_slow
+from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, SlowState, check_slow
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
 from lie_codegen.values import Value
 
 NAMESPACE = "euler_average"
@@ -59,13 +70,13 @@ class EulerAverage(Value):
     tolerance: float = 1e-12
 
     def kernels(self, *, largest_k: float = 0.9) -> tuple[Kernel, ...]:
-        """variational, rate and averaged, for lc.build and lc.generate.
+        """variational, rate and averaged, and terms, near_identity, mean_rate and actual_rate of the second order.
 
         Args:
             largest_k: where g is not affine, the averages in C take as many fixed phases as rounding accuracy needs up
                 to this modulus, by the nome.
         """
-        return (*self._basic(), self.averaged_kernel(largest_k))
+        return (*self._basic(), self.averaged_kernel(largest_k), *second_order_kernels(self.perturbation, NAMESPACE))
 
     def averaged_kernel(self, largest_k: float = 0.9) -> Kernel:
         """(Omega, k) -> averages: Table 3 for affine g, else the trapezoid rule with `nodes_for(largest_k)` phases."""
@@ -77,9 +88,123 @@ class EulerAverage(Value):
 
     @cached_property
     def library(self) -> Library:
-        """Compiled: variational, rate and, where Table 3 applies, averaged."""
-        closed = (self.averaged_kernel(),) if self.is_closed else ()
+        """Compiled: variational, rate and, where Table 3 applies, averaged and averaged_rate."""
+        rate = euler_kernels.averaged_rate(self.perturbation, NAMESPACE)
+        closed = () if rate is None else (self.averaged_kernel(), rate)
         return build((*self._basic(), *closed))
+
+    @cached_property
+    def second_order_library(self) -> Library:
+        """Compiled: terms, near_identity, mean_rate and actual_rate, loops over phases."""
+        return build(second_order_kernels(self.perturbation, NAMESPACE))
+
+    def second_order(self, Omega: ArrayLike, k: ArrayLike, tau: ArrayLike = 0.0) -> SecondOrder:
+        """(F2_Omega, F2_k, G2): mean Omega' = eps F1 + eps^2 F2, phi' = Lambda + eps G1 + eps^2 G2; arguments broadcast.
+
+        Raises:
+            InputError: as `variational`.
+        """
+        self._check(Omega, k)
+        _, F2, _, _, G2 = broadcast_call(self.second_order_library["terms"], self._stacked(Omega, k, tau))
+        return SecondOrder(F2[..., 0][()], F2[..., 1][()], G2)
+
+    def near_identity(self, Omega: ArrayLike, k: ArrayLike, phi: ArrayLike, tau: ArrayLike = 0.0) -> NearIdentity:
+        """(W_Omega, W_k, V): osculating variables are mean ones plus eps times these; arguments broadcast.
+
+        Raises:
+            InputError: as `variational`.
+        """
+        self._check(Omega, k)
+        W, V = broadcast_call(self.second_order_library["near_identity"], self._stacked(Omega, k, tau), phi)
+        return NearIdentity(W[..., 0][()], W[..., 1][()], V)
+
+    def to_mean(self, Omega: float, k: float, phi: float, eps: float, tau: float = 0.0) -> SlowState:
+        """Mean (Omega, k, phi) of osculating ones, by half steps of the fixed point; where eps is too large, at first order.
+
+        Raises:
+            InputError: as `variational`.
+        """
+        self._check(Omega, k)
+        return self._to_mean(Omega, k, phi, eps, tau)[0]
+
+    def to_osculating(
+        self, Omega: ArrayLike, k: ArrayLike, phi: ArrayLike, eps: float, tau: ArrayLike = 0.0
+    ) -> SlowState:
+        """Osculating (Omega, k, phi) of mean ones; arguments broadcast."""
+        W = self.near_identity(Omega, k, phi, tau)
+        values = zip((Omega, k, phi), W, strict=True)
+        return SlowState(*(np.asarray(mean, dtype=float) + eps * w for mean, w in values))
+
+    def _stacked(self, *columns: ArrayLike) -> Array:
+        kept = columns[:2] if self.perturbation.is_autonomous else columns
+        return np.stack(np.broadcast_arrays(*(np.asarray(each, dtype=float) for each in kept)), axis=-1)
+
+    def _to_mean(self, Omega: float, k: float, phi: float, eps: float, tau: float) -> tuple[SlowState, str]:
+        function = self.second_order_library["near_identity"]
+
+        def maps(y: Array, psi: float) -> tuple[Array, Any]:
+            W, V = function(y, psi)
+            return np.asarray(W), V
+
+        y, psi, status = to_mean(maps, inside(self._stacked(Omega, k, tau)), float(phi), eps, inside)
+        return SlowState(y[0], y[1], np.asarray(psi)[()]), status
+
+    def solve(
+        self, omega0: ArrayLike, t: ArrayLike, eps: float, *, order: int = 2, start: str = "mean", rtol: float = 1e-12
+    ) -> EulerSolution | list[EulerSolution]:
+        """The motion from omega0 at t[0] by averaging, mean and osculating; what was computed before an event is returned.
+
+        Over times of order 1/eps: Omega and k to O(eps^2) with order 2, to O(eps) with order 1; phi to O(eps) with order 2,
+        to no order with order 1 (F3 would be needed for more, as phi integrates Lambda along the slow error).
+
+        Args:
+            omega0: (3,) [rad/s], or (B, 3) for a list of solutions; a motion about another axis than the body's takes the
+                axes and signs that it needs.
+            t: (N,) [s], increasing; the first is the start.
+            eps: the small number.
+            order: 1 or 2.
+            start: "mean" starts at the mean point that belongs to omega0; "osculating" at omega0 itself, as the paper does.
+            rtol: of the integration of the averaged system.
+
+        Raises:
+            InputError: another order or start; omega0 at rest or on the separatrix.
+        """
+        if order not in (1, 2) or start not in ("mean", "osculating"):
+            raise InputError(f"order is 1 or 2 and start 'mean' or 'osculating', given {order!r}, {start!r}")
+        vector, times = np.asarray(omega0, dtype=float), np.atleast_1d(np.asarray(t, dtype=float))
+        if vector.ndim == 2:
+            return [self._solve(each, times, eps, order, start, rtol) for each in vector]
+        return self._solve(vector, times, eps, order, start, rtol)
+
+    def _solve(self, omega0: Array, t: Array, eps: float, order: int, start: str, rtol: float) -> EulerSolution:
+        body = self.body.adapted_to(omega0)
+        if body != self.body:
+            other = EulerAverage(body, EulerPerturbation(body.model, self.perturbation.terms), self.tolerance)
+            return other._solve(omega0, t, eps, order, start, rtol)
+        if np.any(np.diff(t) <= 0) or not np.all(np.isfinite(t)):
+            raise InputError("t: finite, increasing times; the first is the start")
+        if len(t) == 1:
+            t = np.array([0.0, t[0]])
+        first, tau = body.to_slow(omega0, eps * t[0]), eps * float(t[0])
+        mean, status = first, GOOD
+        if start == "mean":
+            mean, status = self._to_mean(float(first.Omega), float(first.k), float(first.phi), eps, tau)
+        state = np.append(self._stacked(mean.Omega, mean.k, tau), mean.phi)
+        rate = Field(
+            self.second_order_library["mean_rate"], len(state), time=None, constants={"eps": eps, "order": order}
+        )
+        ends = Field(lambda _, y: np.array([MARGIN - y[1], y[0] - 1e-9 * first.Omega]), len(state))
+        motion = integrate(rate, state, t[0], t[-1], rtol=rtol, atol=1e-13, events=ends, directions=[-1, -1])
+        if motion.status == EVENT:
+            status = ("separatrix", "the spin dies out")[motion.event]
+        elif motion.status != REACHED:
+            status = f"the averaged system has no solution beyond t = {motion.t[-1]:.9g}"
+        kept = t[t <= motion.t[-1]]
+        y = motion.at(kept)
+        means = MeanMotion(y[:, 0], y[:, 1], y[:, -1])
+        found = self.to_osculating(means.Omega, means.k, means.phi, eps, eps * kept)
+        omega = body.from_slow(found.Omega, np.clip(found.k, 0, LARGEST_MODULUS), found.phi, eps * kept)
+        return EulerSolution(kept, *found, omega, means, status, float(motion.t[-1]), order)
 
     @property
     def is_closed(self) -> bool:

@@ -8,10 +8,13 @@ from typing import Any
 
 import sympy as sp
 
+from lie_codegen.averaging.phase_routine import Nodes
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.elliptic import Jacobi, Ladder, jacobi, ladder, phase
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.routine import call_routine
+from lie_codegen.rigid_body.euler_second_order import phase_loop
 from lie_codegen.rigid_body.euler_variational import (
     CN,
     DN,
@@ -102,7 +105,7 @@ def variational(perturbation: EulerPerturbation, namespace: str) -> Kernel:
 def averaged(perturbation: EulerPerturbation, namespace: str, nodes: int) -> Kernel:
     """(Omega, k) -> (F_Omega, F_k, G), averaged: Table 3 where it applies, else the trapezoid rule in phi."""
     closed = perturbation.averaged
-    body = _closed_form(closed) if closed is not None else _trapezoid(perturbation.variational, nodes)
+    body = _closed_form(closed) if closed is not None else _trapezoid(perturbation, namespace, nodes)
     outputs = (Port("F_Omega", (), "rad/s^2"), Port("F_k", (), "1/s"), Port("G", (), "1/s"))
     source = "Table 3" if closed is not None else f"Table 2, mean of {nodes} phases"
     return _kernel(
@@ -136,17 +139,40 @@ def _closed_form(expressions: Sequence[sp.Expr]) -> Callable[..., tuple[Any, ...
     return make
 
 
-def _trapezoid(expressions: Sequence[sp.Expr], nodes: int) -> Callable[..., tuple[Any, ...]]:
+def _trapezoid(perturbation: EulerPerturbation, namespace: str, nodes: int) -> Callable[..., tuple[Any, ...]]:
+    """The means by the loop over phases of first order."""
+    loop = phase_loop(perturbation, namespace, Nodes(((float("inf"), nodes),), 1))
+    n = 2 if perturbation.is_autonomous else 3
+
     def make(ops: Arithmetic, evaluate: ExpressionEvaluator, spin: Scalar, k: Scalar) -> tuple[Any, ...]:
-        steps = ladder(ops, k)
-        totals: list[Scalar] = [0, 0, 0]
-        for node in range(nodes):
-            phi = ops.constant(sp.Rational(node, nodes))
-            at = _at(ops, evaluate.memo, spin, k, steps, jacobi(ops, phi, steps))
-            totals = [total + at(expression) for total, expression in zip(totals, expressions, strict=True)]
-        return tuple(total / nodes for total in totals)
+        slow = [] if perturbation.is_autonomous else [evaluate(TAU)]
+        result = call_routine(ops, loop, [spin, k, *slow, ops.constant(0), ops.constant(1)])
+        return result[0], result[1], result[n + 1]
 
     return make
+
+
+def averaged_rate(perturbation: EulerPerturbation, namespace: str) -> Kernel | None:
+    """(y, t, eps) -> y' of the averaged system, y = (Omega, k, phi), by Table 3; None where it does not apply."""
+    closed = perturbation.averaged
+    if closed is None:
+        return None
+
+    def body(ops: Arithmetic, y: Sequence[Scalar], t: Scalar, eps: Scalar) -> tuple[Any, ...]:
+        memo = {} if perturbation.is_autonomous else {TAU: eps * t}
+        at = _at(ops, memo, y[0], y[1], ladder(ops, y[1]))
+        means = [eps * at(expression) for expression in closed]
+        return ([means[0], means[1], at(perturbation.frequency) + means[2]],)
+
+    inputs = (Port("y", (3,), description="Omega, k, phi"), Port("t", (), "s"), Port("eps", (), "1"))
+
+    def sample(rng: random.Random) -> tuple[Any, ...]:
+        return list(sample_slow(rng)), 0.0, 0.01
+
+    formula = "Omega' = eps mean F_Omega, k' = eps mean F_k, phi' = Lambda + eps mean G"
+    return Kernel(
+        "averaged_rate", namespace, inputs, (Port("y_dot", (3,)),), body, formula, f"{SOURCE}, (21), Table 3", sample
+    )
 
 
 def _at(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -15,19 +14,25 @@ from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
+from lie_codegen.runtime.ode import REACHED, Field, integrate
+
+#: k of a start in the polar coordinates (k, phi).
+_LEAST = 1e-12
 
 
-@dataclass(frozen=True)
-class SlowSolution:
+@dataclass(frozen=True, eq=False, repr=False)
+class SlowSolution(Saved):
     """The averaged system at times t.
 
     Attributes:
-        t: (N,) [s].
+        t: (N,) [s]; fewer than were asked for where the status is not "ok".
         Omega, k: (N,) the slow variables, within O(eps) of the actual ones over times of order 1/eps.
         phi: (N,) the averaged phase; to first order in averaging it is known only to O(1) over such times.
         evaluations: right-hand sides taken.
+        status: "ok", or why and when it ends.
     """
 
     t: Array
@@ -35,57 +40,50 @@ class SlowSolution:
     k: Array
     phi: Array
     evaluations: int
+    status: str = "ok"
 
 
 def solve_averaged(
     flow: EulerAverage, Omega0: float, k0: float, t: ArrayLike, eps: float, *, phi0: float = 0.0, rtol: float = 1e-11
 ) -> SlowSolution:
-    """(21): Omega' = eps Fbar_Omega, k' = eps Fbar_k, phi' = Lambda + eps Gbar, from t[0].
+    """(21): Omega' = eps Fbar_Omega, k' = eps Fbar_k, phi' = Lambda + eps Gbar, from t[0], in compiled steps.
+
+    Where k leaves the range in which averaging is valid (in one period of the fast phase the slow drift would cover the rest
+    of the way to the separatrix) or the spin dies out, what was computed before is returned, and the status says so. This
+    is the paper's way to start, at the osculating point; `EulerAverage.solve` starts at the mean point.
 
     Raises:
         InputError: as `EulerAverage.averaged`, for the start.
-        ComputationError: k leaves the range in which averaging is valid: in one period of the fast phase the slow
-            drift would cover the rest of the way to the separatrix, or the spin dies out.
+        ComputationError: averaging is not valid at the start.
     """
-    from scipy.integrate import solve_ivp
-
     times = _times(t)
-    flow.averaged(Omega0, max(k0, 1e-12))
-    functions, autonomous = flow.library, flow.perturbation.is_autonomous
-    closed = functions["averaged"] if flow.is_closed else None
+    flow.averaged(Omega0, max(k0, _LEAST), eps * times[0])
+    rate, size = _averaged_field(flow, eps)
 
-    def means(spin: float, k: float, tau: float) -> Any:
-        if closed is None:
-            return flow.averaged(spin, k, tau)
-        return closed(spin, k) if autonomous else closed(spin, k, tau)
+    def leaving(time: float, state: Array) -> Array:
+        y = np.array([state[0], min(max(state[1], _LEAST), LARGEST_MODULUS), *state[2:]])
+        slope = rate(time, y)
+        return np.array([1 - state[1] - max(slope[1], 0.0) / abs(slope[-1]), state[0] - 1e-9 * Omega0])
 
-    def fast(spin: float, k: float, tau: float) -> float:
-        return float(flow.body.frequency(spin, min(k, LARGEST_MODULUS), tau))
-
-    def slope(time: float, state: Any) -> list[float]:
-        spin, k, _ = (float(x) for x in state)
-        mean = means(spin, min(max(k, 1e-12), LARGEST_MODULUS), eps * time)
-        return [eps * mean[0], eps * mean[1], fast(spin, k, eps * time) + eps * mean[2]]
-
-    def leaving(time: float, state: Any) -> float:
-        spin, k = float(state[0]), min(max(float(state[1]), 1e-12), LARGEST_MODULUS)
-        drift = max(eps * float(means(spin, k, eps * time)[1]), 0.0) / abs(fast(spin, k, eps * time))
-        return min(1 - float(state[1]) - drift, float(state[0]))
-
-    leaving.terminal = True  # type: ignore[attr-defined]
-    if leaving(times[0], (Omega0, k0)) <= 0:
+    slow = [eps * times[0]] if size == 4 else []
+    start = np.array([Omega0, k0 if flow.is_closed else max(k0, _LEAST), *slow, phi0])
+    if np.any(leaving(times[0], start) <= 0):
         raise ComputationError(_leaves(times[0], Omega0, k0))
-    result = solve_ivp(
-        slope, (times[0], times[-1]), [Omega0, k0, phi0], method="DOP853", t_eval=times, rtol=rtol, atol=rtol,
-        events=leaving,
-    )  # fmt: skip
-    if result.status == 1:
-        spin, k, _ = result.y_events[0][0]
-        raise ComputationError(_leaves(result.t_events[0][0], spin, k))
-    if not result.success:
-        raise ComputationError(f"the averaged system could not be integrated: {result.message}")
-    spin, k, phi = result.y
-    return SlowSolution(times, spin, k, phi, result.nfev)
+    motion = integrate(
+        rate, start, times[0], times[-1], rtol=rtol, atol=rtol, events=Field(leaving, size), directions=(-1, -1)
+    )
+    status = "ok" if motion.status == REACHED else _leaves(motion.t[-1], *motion.y[-1, :2])
+    kept = times[times <= motion.t[-1]]
+    found = motion.at(kept)
+    return SlowSolution(kept, found[:, 0], found[:, 1], found[:, -1], motion.evaluations, status)
+
+
+def _averaged_field(flow: EulerAverage, eps: float) -> tuple[Field, int]:
+    """The averaged system as C calls it: by Table 3 where it applies, else by the loop over phases."""
+    if flow.is_closed:
+        return Field(flow.library["averaged_rate"], 3, constants={"eps": eps}), 3
+    size = 3 if flow.perturbation.is_autonomous else 4
+    return Field(flow.second_order_library["mean_rate"], size, time=None, constants={"eps": eps, "order": 1}), size
 
 
 def _leaves(t: float, spin: float, k: float) -> str:
@@ -96,27 +94,21 @@ def _leaves(t: float, spin: float, k: float) -> str:
 
 
 def solve_actual(flow: EulerAverage, omega0: ArrayLike, t: ArrayLike, eps: float, *, rtol: float = 1e-11) -> Array:
-    """omega (N, 3) [rad/s] of the full equations (3) at times t, by an explicit method of order 8.
+    """omega (N, 3) [rad/s] of the full equations (3) at times t, by compiled steps of order 8.
 
     Raises:
         ComputationError: the integration fails.
     """
-    from scipy.integrate import solve_ivp
-
-    times = _times(t)
-    rate = flow.library["rate"]
-    if flow.perturbation.is_autonomous:
-        slope: Callable[..., Any] = lambda time, w: rate(w, eps)  # noqa: E731
-    else:
-        slope = lambda time, w: rate(w, eps, eps * time)  # noqa: E731
+    times, function = _times(t), flow.library["rate"]
     start = np.asarray(omega0, dtype=np.float64)
-    result = solve_ivp(
-        slope, (times[0], times[-1]), start, method="DOP853", t_eval=times, rtol=rtol, atol=rtol * np.abs(start).max()
-    )
-    if not result.success:
-        raise ComputationError(f"the full equations could not be integrated: {result.message}")
-    motion: Array = result.y.T
-    return motion
+    if flow.perturbation.is_autonomous:
+        rate = Field(function, 3, state="omega", time=None, constants={"eps": eps})
+    else:
+        rate = Field(lambda time, w: function(w, eps, eps * time), 3)
+    motion = integrate(rate, start, times[0], times[-1], rtol=rtol, atol=rtol * np.abs(start).max())
+    if motion.status != REACHED:
+        raise ComputationError(f"the full equations have no solution beyond t = {motion.t[-1]:.9g}")
+    return motion.at(times)
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class Field:
         self.places = (names.index(state), names.index(time) if time in names else -1)
         self.inputs = [
             np.zeros(port.shape) if number in self.places
-            else np.ascontiguousarray(np.broadcast_to(np.asarray(given.pop(port.name), dtype=float), port.shape))
+            else np.array(np.broadcast_to(np.asarray(given.pop(port.name), dtype=float), port.shape), order="C")
             for number, port in enumerate(rate.inputs)
         ]  # fmt: skip
         if given:

@@ -15,11 +15,11 @@ import lie_codegen
 #: From the ground up; imports point down (or stay on their floor), lazy ones and those for type checkers included.
 LAYERS = (
     "errors", "identifiers", "arrays", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
-    "control", "vehicles", "rigid_body", "averaging", "steering", "pictures", "studies", "gallery", "benchmarks", "cli",
+    "control", "vehicles", "averaging", "rigid_body", "steering", "pictures", "studies", "gallery", "benchmarks", "cli",
 )  # fmt: skip
 PACKAGE = Path(lie_codegen.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
-SUBJECTS = {"groups", "signals", "flow", "mechanics", "control", "vehicles", "rigid_body", "averaging", "steering"}
+SUBJECTS = {"groups", "signals", "flow", "mechanics", "control", "vehicles", "averaging", "rigid_body", "steering"}
 #: third-party package -> layers that may import it (numpy may be imported anywhere).
 ALLOWED = {
     "sympy": {"exact", "algebra", "kernel", *SUBJECTS, "gallery"},
