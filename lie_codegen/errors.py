@@ -9,13 +9,24 @@ from __future__ import annotations
 
 from typing import Any
 
+#: Characters of a message that are shown: what was given may be quoted in it, whatever its length.
+_SHOWN = 6000
+
 
 class LieCodegenError(Exception):
     """Base of all errors of this package."""
 
+    def __str__(self) -> str:
+        text = super().__str__()
+        return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+
 
 class InputError(LieCodegenError, ValueError):
     """What the caller gave is wrong; nothing was written."""
+
+
+class ArgumentError(InputError, TypeError):
+    """An argument of a kind that the function is not made for; names the function, with what failed inside as its cause."""
 
 
 class ExpressionError(InputError):
@@ -124,8 +135,16 @@ class InfeasibleError(SteeringError):
         self.certificate = certificate
 
 
+class CompilerStoppedError(CompileError):
+    """The compiler was stopped (killed, out of time, memory or processes): nothing is wrong with the text, and later it may work."""
+
+
 class MissingDependencyError(ComputationError):
     """An optional package is not installed; names the extra that brings it."""
+
+
+class SystemRefusalError(ComputationError):
+    """The system refuses a file, a process or memory; names the function, with the system's error as its cause."""
 
 
 class CacheError(ComputationError):
@@ -138,6 +157,10 @@ class NoCompilerWarning(UserWarning):
 
 class CompilerWarning(UserWarning):
     """A C compiler that was asked for cannot be used; names it, and the next is tried."""
+
+
+class DegradedWarning(UserWarning):
+    """Calls or batches are slower than they could be in this process; says why, and the results are the same."""
 
 
 class CacheWarning(UserWarning):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.averaging.averaged import average
+from lie_codegen.averaging.order_check import checked_scales
 from lie_codegen.flow.attitude_metrics import distances, rotation_angle
 from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -65,6 +66,7 @@ def corollary_check(
         ChartError: if the coordinates leave |g_2| < pi / 2, where the corollaries say nothing.
     """
     group = as_group(group, "corollary_check")
+    eps = checked_scales("corollary_check", u, eps, horizon)
     averaged = average(group, u, order, "product")
     coordinates, angles, norms = [], [], []
     for value in eps:

@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.averaging.averaged import Averaged, average
 from lie_codegen.averaging.chart_limit import chart_end
 from lie_codegen.errors import AssumptionWarning, InputError
+from lie_codegen.exact.budget import shown
 from lie_codegen.flow.attitude_metrics import METRICS, distances
 from lie_codegen.flow.reference_flow import ReferenceFlow, reference_flow
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -22,6 +23,8 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 #: state(eps, t) -> (k, d, d)
 State = Callable[[float, Array], Array]
 
+#: Bounds of what is simulated: beyond them there is nothing to see, and it would take for ever.
+_LARGEST, _LARGEST_EPS, _PERIODS = 1e6, 100.0, 1e5
 #: A measured order may fall short of p by this much at the smallest eps.
 SHORTFALL = 0.15
 _FLOOR = 2e-13
@@ -100,13 +103,9 @@ def order_check(
         ChartError: the coordinates of the metric reach the edge of their chart.
     """
     group = as_group(group, "order_check")
-    if isinstance(eps, str) or not all(isinstance(e, int | float | np.number) for e in eps):
-        raise InputError(f"order_check: eps must hold two or more different positive numbers, got {eps!r}")
-    values = tuple(sorted((float(e) for e in eps), reverse=True))
-    if len(set(values)) < max(2, len(values)) or not all(0 < e < np.inf for e in values):
-        raise InputError(f"order_check: eps must hold two or more different positive numbers, got {tuple(eps)}")
-    if not 0 < horizon < np.inf:
-        raise InputError(f"order_check: horizon must be positive, got {horizon}")
+    values = tuple(sorted(checked_scales("order_check", u, eps, horizon), reverse=True))
+    if len(set(values)) < max(2, len(values)):
+        raise InputError(f"order_check: eps must hold two or more different positive numbers, got {values}")
     if metric not in METRICS:
         raise InputError(f"order_check: no metric {metric!r}; choose one of {', '.join(METRICS)}")
     averaged = average(group, u, order, form)
@@ -133,6 +132,26 @@ def measure(
         sup.append(float(np.max(error)))
         whole.append(float(np.max(error[flow.whole])))
     return sup, whole
+
+
+def checked_scales(where: str, u: PeriodicInput, eps: Sequence[float], horizon: float) -> tuple[float, ...]:
+    """eps as floats.
+
+    Raises:
+        InputError: eps or horizon are no positive numbers, eps is so large that nothing is averaged, or horizon / eps is more periods than
+            are simulated.
+    """
+    if isinstance(eps, str | bytes) or not isinstance(eps, Sequence | np.ndarray) or not len(eps):
+        raise InputError(f"{where}: eps must hold positive numbers, got {shown(eps)}")
+    for value in (*eps, horizon):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value <= _LARGEST:
+            raise InputError(f"{where}: eps and horizon are positive numbers up to {_LARGEST:g}, got {shown(value)}")
+    periods = horizon / min(eps) / float(u.period)
+    if not periods <= _PERIODS or not max(eps) <= _LARGEST_EPS:
+        raise InputError(
+            f"{where}: horizon / eps is {periods:.3g} periods; at most {_PERIODS:g} are simulated, for eps up to {_LARGEST_EPS:g}"
+        )
+    return tuple(float(value) for value in eps)
 
 
 def slopes(eps: Sequence[float], errors: Sequence[float]) -> list[float]:

@@ -77,3 +77,9 @@ def main() -> None:
     except LieCodegenError as error:
         complain(f"lie-codegen: {error}")
         sys.exit(1)
+    except (OSError, MemoryError) as error:
+        complain(f"lie-codegen: the system refuses: {error or type(error).__name__}")
+        sys.exit(1)
+    except RecursionError:
+        complain("lie-codegen: what was given is nested too deep")
+        sys.exit(2)

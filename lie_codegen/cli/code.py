@@ -97,11 +97,13 @@ def cache(
     text = f"{info.folder}: {info.entries} libraries, {info.bytes / 1e6:.1f} of {info.limit / 1e6:.0f} MB"
     if clear:
         text += f"; {removed} removed"
+    text += "".join(f"\ndegraded: {line}" for line in info.degraded)
     if info.problem:
         text += f"\ncannot be used: {info.problem}"
     data = {
         "folder": info.folder,
         "problem": info.problem,
+        "degraded": info.degraded,
         "entries": info.entries,
         "bytes": info.bytes,
         "limit": info.limit,

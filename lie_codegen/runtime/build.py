@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import CacheError, CodegenError
 from lie_codegen.runtime import cache
-from lie_codegen.runtime.cache_door import compiled_entry, request_key
-from lie_codegen.runtime.cache_folder import usable_folder
+from lie_codegen.runtime.cache_door import Attempt, compiled_entry, request_key
+from lie_codegen.runtime.cache_folder import note_not_loaded, usable_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, warn_no_compiler
 from lie_codegen.runtime.digests import cpu_identity, digest
 from lie_codegen.runtime.extension import prepare_extension
 from lie_codegen.runtime.ladder import compile_entry
 from lie_codegen.runtime.lane_library import ONE_LANE, keep_sources
 from lie_codegen.runtime.library import Library, check_names
+
+#: Times that an entry may go between its build and its opening.
+_EVICTIONS = 3
 
 if TYPE_CHECKING:
     from lie_codegen.codegen.library_sources import LibrarySources
@@ -144,7 +147,19 @@ def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler
                 cache.store_request(folder, requests[number], key)
         return entry
 
-    return _open(compiled_entry(folder, compilers, attempt))
+    return _opened_somewhere(folder, compilers, attempt)
+
+
+def _opened_somewhere(folder: Path, compilers: Sequence[Compiler], attempt: Attempt) -> Library:
+    """The library, opened: another process may evict it before that, and a disk may be mounted so that nothing on it is loaded."""
+    for _ in range(_EVICTIONS):
+        entry = compiled_entry(folder, compilers, attempt)
+        try:
+            return _open(entry)
+        except CacheError as error:
+            if entry.library.is_file() and note_not_loaded(entry.library, str(error)):
+                break
+    return _open(compiled_entry(usable_folder(), compilers, attempt))
 
 
 def _fill(folder: Path, key: str, sources: LibrarySources, compiler: Compiler, flags: tuple[str, ...]) -> cache.Entry:

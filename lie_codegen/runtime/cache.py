@@ -11,35 +11,51 @@ The name of a library holds the digest of its content: a path that was loaded is
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import json
 import os
 import re
 import shutil
+import warnings
+import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.signature import Signature
+from lie_codegen.errors import CacheWarning
+from lie_codegen.runtime.compiler import compile_seconds
 
 #: The form of every key.
 DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Entry:
-    """A verified library on disk."""
+    """A verified library on disk; while the record lives its process does not evict it."""
 
     namespace: str
     library: Path
     signatures: tuple[Signature, ...]
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        _living.add(self)
+
+
+_living: weakref.WeakSet[Entry] = weakref.WeakSet()
+
+
+def in_use() -> set[str]:
+    """Keys of the entries that this process may still read from."""
+    return {entry.library.parent.name for entry in list(_living)}
+
 
 def find_request(folder: Path, request: str) -> Entry | None:
     """The library that answered an equal request before, verified; None if there is none."""
-    data = _read_json(folder / "requests" / f"{request}.json")
+    data = read_json(folder / "requests" / f"{request}.json")
     key = data.get("entry") if isinstance(data, dict) else None
     return find_entry(folder, key) if isinstance(key, str) and DIGEST.fullmatch(key) else None
 
@@ -47,7 +63,7 @@ def find_request(folder: Path, request: str) -> Entry | None:
 def find_entry(folder: Path, key: str) -> Entry | None:
     """The library of that digest, verified byte for byte; None if it is missing or damaged."""
     home = folder / "entries" / key
-    data = _read_json(home / "entry.json")
+    data = read_json(home / "entry.json")
     try:
         namespace, name, expected = str(data["namespace"]), str(data["file"]), str(data["sha256"])
         signatures = tuple(Signature.from_json(each) for each in data["signatures"])
@@ -102,7 +118,7 @@ def store_request(folder: Path, request: str, key: str) -> None:
 
 def find_note(folder: Path, key: str) -> Any:
     """What was noted under that digest; None if nothing was."""
-    return _read_json(folder / "requests" / f"{key}.json")
+    return read_json(folder / "requests" / f"{key}.json")
 
 
 def store_note(folder: Path, key: str, data: Any) -> None:
@@ -116,17 +132,36 @@ def store_note(folder: Path, key: str, data: Any) -> None:
 
 @contextlib.contextmanager
 def lock(folder: Path, key: str) -> Iterator[None]:
-    """Hold the entry against other processes; a process that dies lets go of it.
+    """Hold the entry against other processes; a process that dies lets go of it. One that hangs is not waited for for ever.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    from filelock import FileLock
+    from filelock import FileLock, Timeout
 
     locks = folder / "locks"
     locks.mkdir(mode=0o700, exist_ok=True)
-    with FileLock(locks / f"{key}.lock"):
+    held = FileLock(locks / f"{key}.lock")
+    patience = compile_seconds()
+    try:
+        held.acquire(timeout=patience)
+    except Timeout:
+        _warn_held(str(folder), patience)
+    except NotImplementedError:
+        pass  # a file system without locks: entries are written atomically, so that building twice costs time alone
+    try:
         yield
+    finally:
+        held.release()
+
+
+@functools.cache
+def _warn_held(folder: str, patience: float) -> None:
+    warnings.warn(
+        f"another process has held a lock of {folder} for {patience:g} s (LIE_CODEGEN_COMPILE_SECONDS); building beside it",
+        CacheWarning,
+        stacklevel=4,
+    )
 
 
 @contextlib.contextmanager
@@ -166,7 +201,8 @@ def write_json(path: Path, data: Any) -> None:
         raise
 
 
-def _read_json(path: Path) -> Any:
+def read_json(path: Path) -> Any:
+    """What a JSON file holds; None where it cannot be read."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

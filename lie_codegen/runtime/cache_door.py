@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from lie_codegen.errors import CacheError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import temporary_folder
 from lie_codegen.runtime.cache_upkeep import evict
@@ -29,9 +30,11 @@ def request_key(compiler: Compiler, flags: tuple[str, ...], **asked: Any) -> str
     )
 
 
-def compiled_entry(
-    folder: Path, compilers: Sequence[Compiler], attempt: Callable[[Path, int, Compiler], cache.Entry]
-) -> cache.Entry:
+#: (folder, number of the compiler, compiler) -> the entry found or made with it.
+Attempt = Callable[[Path, int, Compiler], cache.Entry]
+
+
+def compiled_entry(folder: Path, compilers: Sequence[Compiler], attempt: Attempt) -> cache.Entry:
     """The entry that `attempt` (folder, number of the compiler, compiler) finds or makes with the first compiler that works.
 
     Where the cache cannot be written a temporary folder takes its place; what is over the cache's limit is evicted.
@@ -43,13 +46,18 @@ def compiled_entry(
     try:
         entry = _attempted(folder, compilers, attempt)
     except OSError as error:
-        folder = temporary_folder(f"the cache folder {folder} cannot be written: {error.strerror or error}")
-        entry = _attempted(folder, compilers, attempt)
-    evict(folder, keep=entry.library.parent.name)
+        why = error.strerror or error
+        folder = temporary_folder(f"the cache folder {folder} cannot be written: {why}")
+        try:
+            entry = _attempted(folder, compilers, attempt)
+        except OSError as second:
+            raise CacheError(
+                f"no folder to compile in: the cache folder ({why}) and the temporary folder {folder} "
+                f"({second.strerror or second}) cannot be written"
+            ) from second
+    evict(folder)
     return entry
 
 
-def _attempted(
-    folder: Path, compilers: Sequence[Compiler], attempt: Callable[[Path, int, Compiler], cache.Entry]
-) -> cache.Entry:
+def _attempted(folder: Path, compilers: Sequence[Compiler], attempt: Attempt) -> cache.Entry:
     return first_that_works(folder, compilers, lambda number, compiler: attempt(folder, number, compiler))

@@ -43,6 +43,10 @@ def why_unusable(folder: Path) -> str | None:
     return None
 
 
+#: {folder: why} whose libraries the system did not load in this process, as on a disk mounted noexec.
+_not_loaded: dict[Path, str] = {}
+
+
 def usable_folder() -> Path:
     """The cache folder, or after one warning a private temporary folder that goes with the process.
 
@@ -50,8 +54,17 @@ def usable_folder() -> Path:
         CacheError: there is neither.
     """
     folder = cache_folder()
-    reason = why_unusable(folder)
+    reason = _not_loaded.get(folder) or why_unusable(folder)
     return folder if reason is None else temporary_folder(f"the cache folder {folder} cannot be used: {reason}")
+
+
+def note_not_loaded(library: Path, why: str) -> bool:
+    """Take a temporary folder from now on, where it was a library of the cache folder that could not be loaded; whether it was."""
+    folder = cache_folder()
+    if folder not in library.parents or folder in _not_loaded:
+        return False
+    _not_loaded[folder] = f"the system loads no library from it ({why}); is it mounted noexec?"
+    return True
 
 
 def temporary_folder(reason: str) -> Path:
@@ -61,7 +74,11 @@ def temporary_folder(reason: str) -> Path:
         CacheError: none can be made.
     """
     _warn_once(reason)
-    return _temporary()
+    folder = _temporary()
+    if not folder.is_dir():  # someone cleaned up
+        _temporary.cache_clear()
+        folder = _temporary()
+    return folder
 
 
 @cache
@@ -81,5 +98,11 @@ def _temporary() -> Path:
         folder = Path(tempfile.mkdtemp(prefix="lie_codegen-"))
     except OSError as error:
         raise CacheError(f"no folder to compile in: the temporary folder {tempfile.gettempdir()}: {error}") from error
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    atexit.register(_remove, folder, os.getpid())
     return folder
+
+
+def _remove(folder: Path, owner: int) -> None:
+    """A child of `os.fork` leaves it to its parent, which made it and may go on using it."""
+    if os.getpid() == owner:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -8,11 +8,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from lie_codegen.runtime.cache import DIGEST, remove_scratch, unlink
+from lie_codegen.runtime.cache import DIGEST, in_use, read_json, remove_scratch, unlink
 from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 
 _DEFAULT_LIMIT = 1 << 30
 _STALE_SECONDS = 3_600.0
+_DAY = 86_400.0
+_AGED_DAYS = 30
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,14 @@ class CacheInfo:
     Attributes:
         folder: where the cache is.
         problem: why it cannot be used, or None.
+        degraded: what is slower than it could be, and why.
         entries, bytes: number of libraries, and their size.
         limit: bytes above which the least recently used go; LIE_CODEGEN_CACHE_LIMIT overrides.
     """
 
     folder: Path
     problem: str | None
+    degraded: tuple[str, ...]
     entries: int
     bytes: int
     limit: int
@@ -38,7 +42,11 @@ def cache_info() -> CacheInfo:
     folder = cache_folder()
     problem = why_unusable(folder) if folder.exists() else None
     entries = _entries(folder)
-    return CacheInfo(folder, problem, len(entries), sum(_size(entry) for entry in entries), limit())
+    from lie_codegen.runtime.degraded import why_degraded
+
+    return CacheInfo(
+        folder, problem, why_degraded(folder), len(entries), sum(_size(entry) for entry in entries), limit()
+    )
 
 
 def clear_cache() -> int:
@@ -54,6 +62,7 @@ def _clear(folder: Path) -> int:
     entries = _entries(folder)
     for entry in entries:
         _remove_entry(entry)
+    unlink(folder / "requests" / ".looked-after")
     for pattern in ("requests/*.json", "locks/*.lock"):
         for file in folder.glob(pattern):
             if DIGEST.fullmatch(file.stem):
@@ -73,15 +82,19 @@ def limit() -> int:
         return _DEFAULT_LIMIT
 
 
-def evict(folder: Path, keep: str) -> None:
-    """Remove what a killed build left, and the least recently used libraries above the limit."""
+def evict(folder: Path) -> None:
+    """Remove what a killed build left, and the least recently used libraries above the limit, but none that this process uses.
+
+    Once a day requests and locks go that nobody has used for a month.
+    """
     _remove_stale(folder)
-    entries = sorted(_entries(folder), key=_last_use)
+    _remove_aged(folder)
+    entries, kept = sorted(_entries(folder), key=_last_use), in_use()
     total = sum(_size(entry) for entry in entries)
     for entry in entries:
         if total <= limit():
             break
-        if entry.name != keep:
+        if entry.name not in kept:
             total -= _size(entry)
             _remove_entry(entry)
 
@@ -96,6 +109,25 @@ def _remove_stale(folder: Path) -> None:
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > _STALE_SECONDS:
                 remove_scratch(left)
+
+
+def _remove_aged(folder: Path) -> None:
+    """Requests whose library is gone, and requests and locks that are old; at most once a day, by the time of a stamp."""
+    stamp, now = folder / "requests" / ".looked-after", time.time()
+    with contextlib.suppress(OSError):
+        if now - stamp.stat().st_mtime < _DAY:
+            return
+    with contextlib.suppress(OSError):
+        stamp.parent.mkdir(mode=0o700, exist_ok=True)
+        stamp.touch(mode=0o600)
+    for file in (*folder.glob("requests/*.json"), *folder.glob("locks/*.lock")):
+        with contextlib.suppress(OSError):
+            data = read_json(file) if file.suffix == ".json" else None
+            key = data.get("entry") if isinstance(data, dict) else None
+            orphan = isinstance(key, str) and not (folder / "entries" / key).exists()
+            # A lock is touched whenever it is taken, and held for minutes: one of last month is nobody's.
+            if DIGEST.fullmatch(file.stem) and (orphan or now - file.stat().st_mtime > _AGED_DAYS * _DAY):
+                unlink(file)
 
 
 def _last_use(entry: Path) -> float:

@@ -7,18 +7,22 @@ another; on Windows install the zig extra.
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import importlib.util
 import os
 import shlex
 import shutil
+import signal
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-from lie_codegen.errors import CompileError, CompilerWarning, NoCompilerWarning
+from lie_codegen.errors import CompileError, CompilerStoppedError, CompilerWarning, NoCompilerWarning
 
 #: -ffp-contract=off: the same numbers as the interpreter; never -ffast-math, which changes the whole process.
 #: No automatic vectorising: gcc 12.2 fuses multiply and add in it in spite of -ffp-contract=off (measured).
@@ -36,6 +40,17 @@ NATIVE = "-march=native"
 #: Above this many statements in one kernel -O2 compiles a quarter longer than -O1 and gains nothing (measured with gcc 12 on
 #: kernels of su3, sp4, su4 and so6: 600 to 3,000 statements run 1 to 5 % slower with -O1, 5,900 to 20,500 equally fast).
 LARGE = 5_000
+#: Seconds that a compiler is given unless LIE_CODEGEN_COMPILE_SECONDS says otherwise; the longest kernel of the tests takes thirty.
+_PATIENCE = 600.0
+#: What gcc and clang print when the system ended a part of them.
+_STOPPED = (
+    "Killed",
+    "Terminated",
+    "virtual memory exhausted",
+    "out of memory",
+    "Cannot allocate memory",
+    "Resource temporarily",
+)
 
 
 @dataclass(frozen=True)
@@ -100,31 +115,72 @@ def compile_library(compiler: Compiler, folder: Path, main: str, output: str, fl
 
     Raises:
         CompileError: with the command and what the compiler printed.
+        CompilerStoppedError: it was killed, or took longer than `compile_seconds`.
+        OSError: there is no space left on the disk.
     """
-    import subprocess  # not needed where the cache has the answer
-
     attempts = [flags]
     if NATIVE in flags:
         attempts.append(tuple(flag for flag in flags if flag != NATIVE))
     failures = []
     for attempt in attempts:
         command = (*compiler.command, *attempt, "-o", output, main, "-lm")
-        try:
-            done = subprocess.run(
-                command,
-                cwd=folder,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                env=_quiet_environment(),
-                check=False,
-            )
-        except OSError as error:
-            raise CompileError(f"cannot run {shlex.join(command)}: {error}") from error
-        if done.returncode == 0 and (folder / output).is_file():
+        status, printed = _run(command, folder)
+        if status == 0 and (folder / output).is_file():
             return
-        failures.append(f"{shlex.join(command)}\nexit status {done.returncode}\n{done.stderr[-4000:].strip()}")
+        if os.strerror(errno.ENOSPC) in printed:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        report = f"{shlex.join(command)}\nexit status {status}\n{printed[-4000:].strip()}"
+        # A negative status is a signal to the compiler's driver; its parts are killed alone, and then it says so.
+        if status < 0 or any(words in printed for words in _STOPPED):
+            raise CompilerStoppedError("the C compiler was stopped (too little memory?):\n" + report)
+        failures.append(report)
     raise CompileError("the C compiler failed:\n" + failures[0])
+
+
+def compile_seconds() -> float:
+    """How long a compiler may take: LIE_CODEGEN_COMPILE_SECONDS, else ten minutes."""
+    try:
+        seconds = float(os.environ.get("LIE_CODEGEN_COMPILE_SECONDS", ""))
+    except ValueError:
+        return _PATIENCE
+    return seconds if seconds > 0 else _PATIENCE
+
+
+def _run(command: tuple[str, ...], folder: Path) -> tuple[int, str]:
+    """(exit status, what it printed), in a session of its own, so that a late compiler is ended with all its parts."""
+    import subprocess  # not needed where the cache has the answer
+
+    try:
+        with subprocess.Popen(
+            command,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            env=_quiet_environment(folder),
+            start_new_session=True,
+        ) as running:
+            try:
+                _, printed = running.communicate(timeout=compile_seconds())
+            except BaseException as stopped:
+                _end(running)
+                if isinstance(stopped, subprocess.TimeoutExpired):
+                    raise CompilerStoppedError(
+                        f"the C compiler gave no answer in {compile_seconds():g} s: {shlex.join(command)}; "
+                        "LIE_CODEGEN_COMPILE_SECONDS allows it more"
+                    ) from None
+                raise
+    except OSError as error:
+        raise CompilerStoppedError(f"cannot run {shlex.join(command)}: {error}") from error
+    return running.returncode, printed.decode(errors="replace")
+
+
+def _end(running: Any) -> None:
+    with contextlib.suppress(OSError):
+        if hasattr(os, "killpg"):
+            os.killpg(running.pid, signal.SIGKILL)
+        else:
+            running.kill()
 
 
 def is_working(compiler: Compiler, folder: Path) -> bool:
@@ -170,5 +226,6 @@ def _identity(command: tuple[str, ...], real: str) -> str:
     return " ".join((*command, real, str(status.st_size), str(status.st_mtime_ns)))
 
 
-def _quiet_environment() -> dict[str, str]:
-    return {**os.environ, "LC_ALL": "C"}
+def _quiet_environment(folder: Path) -> dict[str, str]:
+    """Messages in English; intermediate files beside the text, so that one disk alone must have room."""
+    return {**os.environ, "LC_ALL": "C", "TMPDIR": str(folder)}

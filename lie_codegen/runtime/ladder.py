@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.errors import CompileError
+from lie_codegen.errors import CompileError, CompilerStoppedError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.compiler import Compiler, compile_library, is_working, warn_passed_over
 
@@ -50,7 +50,10 @@ def first_that_works(
     failure: CompileError | None = None
     for number, compiler in enumerate(compilers):
         try:
-            return attempt(number, compiler)
+            try:
+                return attempt(number, compiler)
+            except CompilerStoppedError:
+                return attempt(number, compiler)  # what stopped it may be over: once more
         except CompileError as error:
             with cache.scratch(folder) as probe:
                 if is_working(compiler, probe):

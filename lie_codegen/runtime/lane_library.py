@@ -14,9 +14,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import CompileError
+from lie_codegen.errors import CompileError, CompilerStoppedError
 from lie_codegen.runtime import cache
+from lie_codegen.runtime.cache_folder import temporary_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers
+from lie_codegen.runtime.degraded import BATCHES, warn_degraded
 from lie_codegen.runtime.digests import digest
 from lie_codegen.runtime.ladder import compile_entry
 
@@ -40,7 +42,8 @@ class LaneLibrary:
             if self._opened is None:
                 try:
                     self._opened = ctypes.CDLL(str(self._find_or_compile()))
-                except (OSError, CompileError, LookupError, ValueError, TypeError):
+                except (OSError, CompileError, LookupError, ValueError, TypeError) as error:
+                    warn_degraded(BATCHES, str(error))
                     self._opened = self._scalar
             return self._opened
 
@@ -59,9 +62,22 @@ class LaneLibrary:
         key = digest(["lanes", home.name, compiler.identity])
         entry = cache.find_entry(folder, key)
         if entry is None:
-            with cache.lock(folder, key):
-                entry = cache.find_entry(folder, key) or self._compile(folder, key, sources, compiler)
+            try:
+                entry = self._locked(folder, key, sources, compiler)
+            except OSError as error:
+                folder = temporary_folder(f"the cache folder {folder} cannot be written: {error.strerror or error}")
+                entry = self._locked(folder, key, sources, compiler)
         return entry.library
+
+    def _locked(self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler) -> cache.Entry:
+        with cache.lock(folder, key):
+            found = cache.find_entry(folder, key)
+            if found is not None:
+                return found
+            try:
+                return self._compile(folder, key, sources, compiler)
+            except CompilerStoppedError:
+                return self._compile(folder, key, sources, compiler)
 
     def _compile(self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler) -> cache.Entry:
         return compile_entry(

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from lie_codegen.errors import CacheError
 from lie_codegen.runtime import cache
+from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.cache_door import compiled_entry, request_key
-from lie_codegen.runtime.cache_folder import usable_folder
+from lie_codegen.runtime.cache_folder import note_not_loaded, usable_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers, warn_no_compiler
 from lie_codegen.runtime.ladder import compile_entry
 
@@ -43,7 +45,7 @@ def build_source(
     folder, flags = usable_folder(), (*SOLVER_FLAGS, *more_flags)
     for compiler in compilers:
         entry = cache.find_entry(folder, _key(compiler, namespace, definition, flags))
-        if entry is not None:
+        if entry is not None and _loads(entry.library):
             return entry.library
     files = make_files()
 
@@ -52,7 +54,18 @@ def build_source(
         with cache.lock(folder, key):
             return cache.find_entry(folder, key) or compile_entry(folder, key, files, main, namespace, compiler, flags)
 
-    return compiled_entry(folder, compilers, attempt).library
+    library = compiled_entry(folder, compilers, attempt).library
+    return library if _loads(library) else compiled_entry(usable_folder(), compilers, attempt).library
+
+
+def _loads(library: Path) -> bool:
+    """Whether the system loads it; where it does not, a temporary folder is used from now on. It stays open: the caller loads it next."""
+    try:
+        load_library(library)
+    except CacheError as error:
+        note_not_loaded(library, str(error))
+        return False
+    return True
 
 
 def _key(compiler: Compiler, namespace: str, definition: str, flags: tuple[str, ...]) -> str:

@@ -3,6 +3,6 @@
 The public names stand in __init__.pyi; each is imported when first used.
 """
 
-import lazy_loader
+from lie_codegen import door
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = door.attach(__name__, __file__)

@@ -14,6 +14,7 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.budget import shown
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number
 from lie_codegen.kernel.definition import kernel_factory
@@ -55,6 +56,8 @@ def manipulator_law(
     """
     if kind not in _KINDS:
         raise InputError(f"kind {kind!r} is not known; choose one of {', '.join(_KINDS)}")
+    if isinstance(inertia, str) or not isinstance(inertia, Sequence | sp.MatrixBase) or not len(inertia):
+        raise InputError(f"manipulator_law: inertia must be a list of rows of formulas, got {shown(inertia)}")
     n = len(inertia)
     q, v, r, w, a = (sp.symbols(f"{letter}1:{n + 1}", real=True) for letter in ("q", "v", "r", "w", "a"))
     M, V = _read(inertia, potential, q, parameters or {})

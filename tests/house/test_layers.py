@@ -14,7 +14,7 @@ import lie_codegen
 
 #: From the ground up; imports point down (or stay on their floor), lazy ones and those for type checkers included.
 LAYERS = (
-    "errors", "identifiers", "arrays", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
+    "errors", "door", "identifiers", "arrays", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
     "control", "vehicles", "averaging", "rigid_body", "steering", "pictures", "studies", "gallery", "benchmarks", "cli",
 )  # fmt: skip
 PACKAGE = Path(lie_codegen.__file__).parent

@@ -1,0 +1,92 @@
+"""The door of a subject: its public names, imported when first used, and nothing but errors of ours passes out through them.
+
+What a function was not written for (a text in place of an array, a number of 5,000 digits) fails somewhere inside, in NumPy or SymPy, with
+a TypeError, a ValueError, an OverflowError ... At the door such an error becomes an `ArgumentError` that names the function and
+what it was given, with the first error as its cause. What a function of the user raises passes as it is.
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+import sys
+import types
+from collections.abc import Callable
+from typing import Any
+
+import lazy_loader
+
+from lie_codegen.errors import ArgumentError, LieCodegenError, SystemRefusalError
+
+#: Packages whose frames belong to the work of a call: whatever else raises is the user's own.
+_INSIDE = {"lie_codegen", "numpy", "scipy", "sympy", "mpmath", "casadi", "jinja2", "filelock", "platformdirs", "dask", "distributed", "zarr"}
+_LONGEST = 300
+
+
+def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """(__getattr__, __dir__, __all__) of a subject with a stub beside it."""
+    find, listed, names = lazy_loader.attach_stub(package, file)
+
+    def found(name: str) -> Any:
+        value = _guarded(find(name), name)
+        sys.modules[package].__dict__[name] = value
+        return value
+
+    return found, listed, names
+
+
+def _guarded(value: Any, name: str) -> Any:
+    """The same value; a function is put behind the guard where it is defined too, of a class the constructor is."""
+    if isinstance(value, types.FunctionType) and not hasattr(value, "__guarded__"):
+        guarded = _guard(value, name)
+        home = sys.modules[value.__module__].__dict__
+        if home.get(name) is value:
+            home[name] = guarded
+        return guarded
+    if isinstance(value, type) and not issubclass(value, enum.Enum) and "__init__" in vars(value):
+        constructor = vars(value)["__init__"]
+        if isinstance(constructor, types.FunctionType) and not hasattr(constructor, "__guarded__"):
+            type.__setattr__(value, "__init__", _guard(constructor, name))
+    return value
+
+
+def _guard(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    @functools.wraps(function)
+    def guarded(*args: Any, **named: Any) -> Any:
+        try:
+            return function(*args, **named)
+        except LieCodegenError:
+            raise
+        except Exception as error:
+            # No frame below this one: the arguments could not even be bound, which Python says best.
+            if error.__traceback__ is None or error.__traceback__.tb_next is None or not _is_inside(error):
+                raise
+            kind = SystemRefusalError if isinstance(error, OSError | MemoryError) else ArgumentError
+            # The constructor of a class is given the object too.
+            shown = args[1:] if function.__name__ == "__init__" else args
+            raise kind(f"{name}: {_given(shown, named)}: {type(error).__name__}: {_text(error)}") from error
+
+    guarded.__guarded__ = True  # type: ignore[attr-defined]
+    return guarded
+
+
+def _is_inside(error: Exception) -> bool:
+    """Whether every frame the error came through is ours, of Python's own library or of what we compute with."""
+    trace = error.__traceback__
+    while trace is not None:
+        root = str(trace.tb_frame.f_globals.get("__name__", "")).partition(".")[0]
+        # Code made by lambdify has no module.
+        if root and root not in _INSIDE and root not in sys.stdlib_module_names:
+            return False
+        trace = trace.tb_next
+    return True
+
+
+def _given(args: tuple[Any, ...], named: dict[str, Any]) -> str:
+    kinds = [type(value).__name__ for value in args] + [f"{key}={type(value).__name__}" for key, value in named.items()]
+    return f"cannot work with what was given ({', '.join(kinds)})"
+
+
+def _text(error: Exception) -> str:
+    text = str(error)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
