@@ -19,7 +19,20 @@ import lazy_loader
 from lie_codegen.errors import ArgumentError, LieCodegenError, SystemRefusalError
 
 #: Packages whose frames belong to the work of a call: whatever else raises is the user's own.
-_INSIDE = {"lie_codegen", "numpy", "scipy", "sympy", "mpmath", "casadi", "jinja2", "filelock", "platformdirs", "dask", "distributed", "zarr"}
+_INSIDE = {
+    "lie_codegen",
+    "numpy",
+    "scipy",
+    "sympy",
+    "mpmath",
+    "casadi",
+    "jinja2",
+    "filelock",
+    "platformdirs",
+    "dask",
+    "distributed",
+    "zarr",
+}
 _LONGEST = 300
 
 

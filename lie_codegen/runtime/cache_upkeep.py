@@ -10,6 +10,9 @@ from pathlib import Path
 
 from lie_codegen.runtime.cache import DIGEST, in_use, read_json, remove_scratch, unlink
 from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
+from lie_codegen.runtime.compiler import find_compilers
+from lie_codegen.runtime.degraded import CALLS, reason_of
+from lie_codegen.runtime.extension import has_headers, is_wanted
 
 _DEFAULT_LIMIT = 1 << 30
 _STALE_SECONDS = 3_600.0
@@ -42,11 +45,25 @@ def cache_info() -> CacheInfo:
     folder = cache_folder()
     problem = why_unusable(folder) if folder.exists() else None
     entries = _entries(folder)
-    from lie_codegen.runtime.degraded import why_degraded
-
     return CacheInfo(
         folder, problem, why_degraded(folder), len(entries), sum(_size(entry) for entry in entries), limit()
     )
+
+
+def why_degraded(folder: Path) -> tuple[str, ...]:
+    """What is degraded for users of a cache folder: a line each."""
+    if not find_compilers():
+        return ("kernels are interpreted: no C compiler is found",)
+    lines = []
+    if not is_wanted():
+        lines.append(f"{CALLS}: LIE_CODEGEN_CALL asks for it")
+    elif not has_headers():
+        lines.append(f"{CALLS}: there is no Python.h (the package python3-dev or python3-devel brings it)")
+    for note in sorted((folder / "python").glob("requests/*.json")):
+        reason = reason_of(read_json(note))
+        if reason is not None:
+            lines.append(f"{CALLS}: {' '.join(reason.split())[:500]}")
+    return tuple(lines)
 
 
 def clear_cache() -> int:

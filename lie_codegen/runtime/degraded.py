@@ -31,7 +31,7 @@ def warn_degraded(what: str, why: str) -> None:
 
 def refused_before(folder: Path, key: str) -> str | None:
     """Why that was refused within a day; None if it is to be tried."""
-    return _reason(cache.find_note(folder, key))
+    return reason_of(cache.find_note(folder, key))
 
 
 def note_refused(folder: Path, key: str, reason: str) -> None:
@@ -48,26 +48,8 @@ def forget_refused(folder: Path, key: str) -> None:
     cache.unlink(folder / "requests" / f"{key}.json")
 
 
-def why_degraded(folder: Path) -> tuple[str, ...]:
-    """What is degraded for users of a cache folder: a line each."""
-    from lie_codegen.runtime.compiler import find_compilers
-    from lie_codegen.runtime.extension import has_headers, is_wanted
-
-    if not find_compilers():
-        return ("kernels are interpreted: no C compiler is found",)
-    lines = []
-    if not is_wanted():
-        lines.append(f"{CALLS}: LIE_CODEGEN_CALL asks for it")
-    elif not has_headers():
-        lines.append(f"{CALLS}: there is no Python.h (the package python3-dev or python3-devel brings it)")
-    for note in sorted((folder / "python").glob("requests/*.json")):
-        reason = _reason(cache.read_json(note))
-        if reason is not None:
-            lines.append(f"{CALLS}: {' '.join(reason.split())[:500]}")
-    return tuple(lines)
-
-
-def _reason(note: Any) -> str | None:
+def reason_of(note: Any) -> str | None:
+    """The reason in a note that is not a day old; None for any other."""
     if not isinstance(note, dict) or note.get("entry") is not None:
         return None
     when, reason = note.get("time"), note.get("reason")

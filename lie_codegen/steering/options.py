@@ -13,6 +13,7 @@ from lie_codegen.errors import SteeringInputError
 _WHOLE = (
     "intervals", "pieces", "starts", "rounds", "iterations", "seed", "classes", "q", "harmonics", "order", "threads", "steps",
 )  # fmt: skip
+_MOST = 1_000_000
 _YES_OR_NO = ("rest", "periodic", "polish", "exact")
 _TEXTS = ("objective", "dynamics", "equation", "solver", "quadrature", "integrator", "form", "amplitude", "planner")
 #: Methods that take a drift that depends on time.
@@ -28,6 +29,8 @@ def check_options(where: str, method: str, options: Mapping[str, Any]) -> None:
     for name, value in options.items():
         if name in _WHOLE and not _is_whole(value):
             raise SteeringInputError(f"{where}: {name} is a whole number, got {value!r:.60}")
+        if name in _WHOLE and name != "seed" and not abs(operator.index(value)) <= _MOST:
+            raise SteeringInputError(f"{where}: {name} is a whole number of at most {_MOST}")
         if name in _YES_OR_NO and not isinstance(value, bool | np.bool_):
             raise SteeringInputError(f"{where}: {name} is True or False, got {value!r:.60}")
         if name in _TEXTS and not isinstance(value, str):
