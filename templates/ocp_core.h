@@ -886,6 +886,13 @@ int OCP_(solve)(workspace *w, const real *p, ptrdiff_t stride, real t0, real tol
     s.t0 = t0;
     s.exact = OCP_SECOND_ORDER && w->curvature == 2;
     w->iterations = w->sweeps = 0;
+    /* a tolerance without end would call anything solved, a negative one or NaN nothing */
+    if (!(tolerance >= 0 && tolerance <= 1 && allowed >= 0 && is_finite(allowed)) || !is_finite(t0) || outer < 0 || most < 0
+        || !(w->rho >= 0 && is_finite(w->rho)) || !all_finite(p, stride == 0 ? OCP_NP : (OCP_N + 1) * OCP_NP)) {
+        w->cost = w->violation = (real)HUGE_VAL;
+        w->status = OCP_INPUT;
+        return w->status;
+    }
     w->status = OCP_DIVERGED;
     if (!roll_out(&s)) {
         w->cost = w->violation = (real)HUGE_VAL;

@@ -1066,6 +1066,39 @@ steering_options steering_defaults(void)
     return options;
 }
 
+/* Whether a number lies from low to high; NaN does not. */
+static int within(double value, double low, double high) { return value >= low && value <= high; }
+
+/* Whether a call can be worked with: what is not finite, or no size that a start can have, would end in a wrong status. */
+static int usable(const double *target, const double weights[M], const steering_options *options)
+{
+    int i, good = within(options->tolerance, 0.0, 1.0) && within(options->search_tolerance, 0.0, 1.0)
+        && options->starts > 0 && options->starts <= 1000000 && options->search_steps > 0 && options->polish_steps > 0
+        && options->search_iterations >= 0 && options->polish_iterations >= 0;
+    for (i = 0; i < M; ++i) {
+        good = good && within(weights[i], 1e-100, 1e100);
+    }
+    for (i = 0; i < FULL_SIZE; ++i) {
+        good = good && within(target[i], -1e100, 1e100);
+    }
+    return good;
+}
+
+/* What a target that was not tried gets. */
+static void refuse(steering_result *result)
+{
+    int i, c;
+    memset(result, 0, sizeof *result);
+    result->cost = result->residual = NAN;
+    for (i = 0; i < N; ++i) {
+        result->mu0[i] = NAN;
+        for (c = 0; c < N; ++c) {
+            result->jacobian[i][c] = NAN;
+        }
+    }
+    result->status = STEERING_INPUT;
+}
+
 void steering_solve(int count, const double *targets, const double weights[M],
     const steering_options *options, steering_result *results)
 {
@@ -1073,12 +1106,23 @@ void steering_solve(int count, const double *targets, const double weights[M],
     int k, i, next;
     for (k = 0; k < count; k += LANES) {
         const int some = count - k < LANES ? count - k : LANES;
+        int any = 0;
         for (next = 0; next < some; ++next) {
+            /* one that cannot be used stands in as the identity, so that its neighbours' lanes are what they would be */
+            const int good = usable(targets + (ptrdiff_t)(k + next) * FULL_SIZE, weights, options);
             for (i = 0; i < SIZE; ++i) {
-                packed[next * SIZE + i] = targets[(ptrdiff_t)(k + next) * FULL_SIZE + varying[i]];
+                packed[next * SIZE + i] = good ? targets[(ptrdiff_t)(k + next) * FULL_SIZE + varying[i]] : identity[i];
+            }
+            any = any || good;
+        }
+        if (any) {
+            solve_some(some, packed, weights, options, results + k);
+        }
+        for (next = 0; next < some; ++next) {
+            if (!usable(targets + (ptrdiff_t)(k + next) * FULL_SIZE, weights, options)) {
+                refuse(results + k + next);
             }
         }
-        solve_some(some, packed, weights, options, results + k);
     }
 }
 
@@ -1099,7 +1143,7 @@ void steering_sample(const double mu0[N], const double weights[M], int count, do
         fill(y + N + i, 1, identity[i]);
     }
     size = (4.0 + 2.0 * sqrt(size)) / (count - 1);
-    parts = size < 256.0 ? (int)ceil(size) : 256;
+    parts = size < 256.0 ? (int)ceil(size) : 256; /* NaN too */
     for (k = 0;; ++k) {
         for (i = 0; u != NULL && i < M; ++i) {
             u[(ptrdiff_t)k * M + i] = LANE(y[control_of[i]], 0) / weights[i];

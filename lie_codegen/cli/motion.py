@@ -14,6 +14,7 @@ from lie_codegen.cli.steering import steer
 from lie_codegen.errors import InputError, OutputFolderError
 
 _Optional = typer.Option
+_MOST_SAMPLES = 10_000_000
 
 
 def simulate(
@@ -33,8 +34,8 @@ def simulate(
     from lie_codegen.groups.catalogue_load import group as load
 
     g = load(group)
-    if samples < 2 or not end > 0:
-        raise InputError("simulate: --samples must be at least 2 and --end positive")
+    if not 2 <= samples <= _MOST_SAMPLES or not 0 < end < float("inf"):
+        raise InputError(f"simulate: --samples must be from 2 to {_MOST_SAMPLES}, and --end positive and finite")
     started = time.perf_counter()
     run = run_simulation(g, formula_input(g, u), t=np.linspace(0, end, samples), eps=eps)
     seconds = time.perf_counter() - started

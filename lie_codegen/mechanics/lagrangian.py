@@ -15,6 +15,7 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.errors import InputError
+from lie_codegen.exact.budget import Meter, expanded_terms
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.mechanics.vector_fields import Field, tidy
@@ -182,6 +183,8 @@ def system_from(
     Raises:
         InputError: L not quadratic in the velocities, or a singular mass matrix (the direction is named).
     """
+    # Each term of the expanded Lagrangian is built, differentiated twice and tidied: some 25 products.
+    Meter("the expanded Lagrangian").spend(25 * expanded_terms(lagrangian))
     lagrangian = sp.expand(lagrangian)
     mass = sp.hessian(lagrangian, velocities)
     if mass.has(*velocities):
