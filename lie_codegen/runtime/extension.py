@@ -119,7 +119,9 @@ def _numpy_folder() -> Path:
     return Path(spec.origin).parent
 
 
-def _library(folder: Path, texts: Mapping[str, str], numpy: Path, compiler: Compiler, refusals: list[str]) -> Path | None:
+def _library(
+    folder: Path, texts: Mapping[str, str], numpy: Path, compiler: Compiler, refusals: list[str]
+) -> Path | None:
     version = (numpy / "version.py").read_text(encoding="utf-8")
     key = digest([dict(texts), _FLAGS, sys.version, sys.implementation.cache_tag, version, compiler.identity])
     entry = cache.find_entry(folder, key)
