@@ -46,6 +46,7 @@ from .averaging import wheel_input as wheel_input
 # control
 from .control import Certificate as Certificate
 from .control import ClosedLoop as ClosedLoop
+from .control import adaptive_law as adaptive_law
 from .control import attitude_constants as attitude_constants
 from .control import attitude_law as attitude_law
 from .control import attitude_linearisation as attitude_linearisation
@@ -59,9 +60,14 @@ from .control import error_function as error_function
 from .control import error_names as error_names
 from .control import gains_for_response as gains_for_response
 from .control import generate_closed_loop as generate_closed_loop
+from .control import hybrid_law as hybrid_law
 from .control import integral_law as integral_law
 from .control import invariance as invariance
 from .control import linear_loop as linear_loop
+from .control import loop_margins as loop_margins
+from .control import observer as observer
+from .control import output_feedback_law as output_feedback_law
+from .control import pointing_law as pointing_law
 from .control import read_law as read_law
 from .control import reference as reference
 from .control import rigid_gains as rigid_gains
@@ -162,6 +168,7 @@ from .rigid_body import euler_average as euler_average
 from .rigid_body import euler_perturbation as euler_perturbation
 from .rigid_body import explicit_inertia_change as explicit_inertia_change
 from .rigid_body import free_rigid_body as free_rigid_body
+from .rigid_body import inertia_from_masses as inertia_from_masses
 from .rigid_body import limit_cycle_gains as limit_cycle_gains
 from .rigid_body import limit_cycles as limit_cycles
 from .rigid_body import momentum_directions as momentum_directions

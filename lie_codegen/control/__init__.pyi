@@ -1,5 +1,6 @@
 """Feedback: error functions, tracking and attitude laws, references, closed loops."""
 
+from .adaptive_law import adaptive_law as adaptive_law
 from .attitude import attitude_linearisation as attitude_linearisation
 from .attitude import attitude_region as attitude_region
 from .attitude import cross_term_bound as cross_term_bound
@@ -14,11 +15,16 @@ from .compatibility import check_compatibility as check_compatibility
 from .critical_points import critical_points as critical_points
 from .error_catalogue import error_names as error_names
 from .error_function import error_function as error_function
+from .hybrid_law import hybrid_law as hybrid_law
 from .integral_law import integral_law as integral_law
 from .invariance import invariance as invariance
 from .law_file import read_law as read_law
 from .linearisation import linear_loop as linear_loop
 from .linearisation import rigid_gains as rigid_gains
+from .loop_margins import loop_margins as loop_margins
+from .observer import observer as observer
+from .output_feedback import output_feedback_law as output_feedback_law
+from .pointing_law import pointing_law as pointing_law
 from .reference_kernels import reference as reference
 from .tracking_law import tracking_law as tracking_law
 from .tracking_region import attitude_constants as attitude_constants

@@ -173,13 +173,13 @@ def _law(
     nu, nu_dot, turned = at.transported_rates(xi, xi_d, xi_d_dot)
     xi_e = minus(xi, nu)
     damping = matvec(dissipation, xi_e)
-    forward = _feedforward(ops, real, metric, feedforward, xi, nu, nu_dot, turned)
+    forward = feedforward_force(ops, real, metric, feedforward, xi, nu, nu_dot, turned)
     force = plus(negative(slope), negative(damping), forward)
     energy = phi + dot(matvec(metric, xi_e), xi_e) / 2
     return force, phi, energy, -dot(damping, xi_e)
 
 
-def _feedforward(
+def feedforward_force(
     ops: Arithmetic,
     real: RealMatrices,
     metric: Matrix,
@@ -189,6 +189,7 @@ def _feedforward(
     nu_dot: Vector,
     turned: Vector,
 ) -> Vector:
+    """The feedforward of that name, linear in the metric; `turned` is nu' + [xi, nu]."""
     algebra = real.group.algebra
     if kind == "right":
         return minus(matvec(metric, turned), ad_star(ops, algebra, xi, matvec(metric, nu)))

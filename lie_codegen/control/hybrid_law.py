@@ -1,0 +1,322 @@
+"""Attitude tracking from everywhere: two warped error functions and a jump between them where one is lower.
+
+    phi = tr(K (1 - E))/2,  E = R_d^T R,   T_q(E) = E exp(q kappa phi(E) hat(u)),   Phi_q = phi o T_q,   q = +-1, |u| = 1
+    d Phi_q = exp(q kappa phi u) d phi(T) + q kappa (d phi(T).u) d phi(E)
+
+T_q is a diffeomorphism iff kappa |d phi.u| < 1, and sup |d phi.u| = (s_1 + s_2)/2, s the singular values of hat(u) K: kappa_max = 2/(s_1 + s_2).
+In the eigenbasis of K, with A_i the pair sums: unwanted critical points E_i = F_i exp(-q kappa x_i u), F_i the half turns, at
+
+    x = cos^2(kappa x/2) A_i + sin^2(kappa x/2) m_i,   m_i = A_j u_k^2 + A_k u_j^2,   gap_i = sin^2(kappa x_i) (A_i - m_i)
+
+where the other Phi is lower by gap_i. The law jumps q -> -q where Phi_q - Phi_-q >= delta, 0 < delta < min gap: V falls by delta or more at each
+jump, so there are at most V(0)/delta, none near the reference, and no unwinding, since the law knows R alone. The best u makes the least of
+A_i - m_i largest: a linear program in u_i^2. Mayhew and Teel, Synergistic potential functions (2011); Berkane and Tayebi, Construction of
+synergistic potential functions on SO(3) (2017).
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq, linprog
+
+from lie_codegen.arrays import Array
+from lie_codegen.control.attitude_law import _rotation
+from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, body_inertia, positive_matrix
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.exponential import exp_matrix
+from lie_codegen.groups.maps.guard import nan_off_group
+from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
+from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.groups.units import force_units
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import (
+    Matrix,
+    Vector,
+    bracket,
+    constant_matrix,
+    dot,
+    matmul,
+    matvec,
+    minus,
+    negative,
+    plus,
+    scaled,
+    transpose,
+)
+
+#: Two pair sums that differ by less, relative to the largest, give critical circles, on which the gap is zero.
+_DISTINCT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class HybridLaw(Kernel):
+    """(X, xi, X_d, xi_d, xi_d_dot, q) -> (force, q_next), with the numbers of its jump.
+
+    Attributes:
+        gaps: (3,) how much lower the other function is at the unwanted critical points, by ascending eigenvalue of K_p.
+        hysteresis: delta of the jump.
+        direction: (3,) u in body axes.
+        kappa, kappa_max: the warp, and the largest for which it is a diffeomorphism.
+    """
+
+    gaps: tuple[float, ...] = ()
+    hysteresis: float = 0.0
+    direction: tuple[float, ...] = ()
+    kappa: float = 0.0
+    kappa_max: float = 0.0
+    gain: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
+
+    @property
+    def kernel(self) -> Kernel:
+        """The law itself."""
+        return self
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Where its state starts."""
+        return {"q": 1.0}
+
+    @property
+    def gap(self) -> float:
+        """The least gap: the hysteresis must stay below it."""
+        return min(self.gaps)
+
+    def potential(self, E: ArrayLike, q: int = 1) -> float:
+        """Phi_q(E)."""
+        K, R = np.array(self.gain), np.asarray(E, dtype=float)
+        angle = q * self.kappa * np.trace(K @ (np.eye(3) - R)) / 2
+        u = np.array(self.direction)
+        w = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+        turn = np.eye(3) + np.sin(angle) * w + (1 - np.cos(angle)) * w @ w
+        return float(np.trace(K @ (np.eye(3) - R @ turn)) / 2)
+
+    def unwanted(self, q: int = 1) -> Array:
+        """(3, 3, 3) the critical points of Phi_q other than the reference, which the law leaves by a jump."""
+        K = np.array(self.gain)
+        _, axes = np.linalg.eigh(K)
+        u = axes.T @ np.array(self.direction)
+        A, m = _levels(np.linalg.eigvalsh(K), u)
+        found = []
+        for i in range(3):
+            x = _warped_level(self.kappa, A[i], m[i])
+            half = 2 * np.outer(axes[:, i], axes[:, i]) - np.eye(3)
+            w = np.array(self.direction)
+            W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+            angle = -q * self.kappa * x
+            found.append(half @ (np.eye(3) + np.sin(angle) * W + (1 - np.cos(angle)) * W @ W))
+        return np.array(found)
+
+
+@kernel_factory(group=as_group)
+def hybrid_law(
+    group: GroupLike = "so3",
+    *,
+    inertia: Any,
+    K_p: Any,
+    K_d: Any,
+    kappa: Any = None,
+    direction: Any = None,
+    hysteresis: Any = None,
+    feedforward: str = "levi_civita",
+    name: str = "hybrid_law",
+) -> HybridLaw:
+    """(X, xi, X_d, xi_d, xi_d_dot, q) -> (force, q_next): tracking from every attitude, q = +-1 a state that is held between calls.
+
+    The jump is made before the torque of the same call, so that q_next is what the torque was computed with.
+
+    Args:
+        group: SO(3).
+        inertia: of the body.
+        K_p: gain of phi, its eigenvalues distinct; K_d: dissipation.
+        kappa: of the warp; nine tenths of kappa_max if not given.
+        direction: (3,) u in body axes; the best one if not given.
+        hysteresis: delta; half of the gap if not given. It must exceed what noise does to Phi.
+        feedforward: as `tracking_law`.
+        name: C identifier.
+
+    Raises:
+        InputError: equal eigenvalues of K_p, for which the gap is zero; a kappa, a direction or a hysteresis out of its bounds, with them.
+    """
+    group = as_group(group, "hybrid_law")
+    real = RealMatrices(group)
+    if group.dim != 3 or real.rigid is None:
+        raise InputError(f"hybrid_law is one of SO(3) with the axes as its basis, not of {group.name}")
+    if feedforward not in FEEDFORWARDS:
+        raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
+    K, D, metric = attitude_gain(K_p, 3, "K_p"), positive_matrix(K_d, 3, "K_d"), body_inertia(inertia)
+    gain = as_floats(K)
+    u, warp, most, gaps = _warp(gain, kappa, direction)
+    delta = min(gaps) / 2 if hysteresis is None else float(hysteresis)
+    if not 0 < delta < min(gaps):
+        raise InputError(
+            f"hybrid_law: hysteresis = {delta:g} must lie between 0 and the gap {min(gaps):.6g}: above it the law can stay"
+        )
+    derivation = GroupDerivation(group)
+
+    def body(
+        ops: Arithmetic, X: Matrix, xi: Vector, X_d: Matrix, xi_d: Vector, xi_d_dot: Vector, q: Scalar
+    ) -> tuple[Any, ...]:
+        E = matmul(transpose(X_d), X)
+        weights, axis = constant_matrix(ops, K), [ops.constant(x) for x in u]
+        phi, slope = _trace(weights, E, _gap_matrix(X, X_d))
+        sign = ops.where(ops.less(q, 0), ops.constant(-1), ops.constant(1))
+        here = _warped(ops, derivation, weights, E, phi, axis, warp, sign)
+        there = _warped(ops, derivation, weights, E, phi, axis, warp, -sign)
+        stays = ops.less(here[0] - there[0], ops.constant(delta))
+        chosen = ops.where(stays, sign, -sign)
+        turn = [
+            [ops.where(stays, a, b) for a, b in zip(r, s, strict=True)] for r, s in zip(here[2], there[2], strict=True)
+        ]
+        at = [ops.where(stays, a, b) for a, b in zip(here[1], there[1], strict=True)]
+        pull = plus(matvec(turn, at), scaled(chosen * ops.constant(warp) * dot(at, axis), slope))
+        nu = matvec(transpose(E), xi_d)
+        turned = matvec(transpose(E), xi_d_dot)
+        nu_dot = minus(turned, bracket(ops, group.algebra, xi, nu))
+        inertia_matrix = constant_matrix(ops, metric)
+        forward = feedforward_force(ops, real, inertia_matrix, feedforward, xi, nu, nu_dot, turned)
+        damping = matvec(constant_matrix(ops, D), minus(xi, nu))
+        return plus(negative(pull), negative(damping), forward), chosen
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        vectors = [[rng.uniform(-1, 1) for _ in range(3)] for _ in range(3)]
+        return _rotation(rng), vectors[0], _rotation(rng), vectors[1], vectors[2], rng.choice([-1.0, 1.0])
+
+    speed = velocity_units(group)
+    made = HybridLaw(
+        name=name,
+        namespace=group.name,
+        inputs=(
+            matrix_port(group, "X", "configuration, body to inertial"),
+            Port("xi", (3,), speed, description="body velocity"),
+            matrix_port(group, "X_d", "reference configuration"),
+            Port("xi_d", (3,), speed, description="reference velocity"),
+            Port("xi_d_dot", (3,), velocity_units(group, "s^2"), description="its rate of change"),
+            Port("q", (), description="which of the two functions: 1 or -1, held between calls"),
+        ),
+        outputs=(
+            Port("force", (3,), force_units(group), description="body torque"),
+            Port("q_next", (), description="q after the jump, which the torque uses"),
+        ),
+        body=body,
+        formula="f = -d Phi_q - K_d xi_e + f_FF; q -> -q where Phi_q - Phi_-q >= delta",
+        source="Mayhew and Teel 2011; Berkane and Tayebi 2017",
+        sampler=sampler,
+        gaps=gaps,
+        hysteresis=delta,
+        direction=u,
+        kappa=warp,
+        kappa_max=most,
+        gain=tuple(tuple(float(x) for x in row) for row in gain),
+    )
+    return nan_off_group(made, group, ("X", "X_d"))  # type: ignore[return-value]
+
+
+def _gap_matrix(X: Matrix, X_d: Matrix) -> Matrix:
+    return [[a - b for a, b in zip(r, s, strict=True)] for r, s in zip(X, X_d, strict=True)]
+
+
+def _trace(K: Matrix, E: Matrix, difference: Matrix) -> tuple[Scalar, Vector]:
+    """phi = tr(K D^T D)/4, D = R - R_d, which does not cancel near the reference, and d phi = skew(K E)^."""
+    phi = dot([x for row in matmul(difference, K) for x in row], [x for row in difference for x in row]) / 4
+    return phi, _slope(K, E)
+
+
+def _slope(K: Matrix, E: Matrix) -> Vector:
+    """d/ds tr(K (1 - E exp(s hat a)))/2 = -tr(K E hat a)/2, a component each."""
+    M = matmul(K, E)
+    return [(M[2][1] - M[1][2]) / 2, (M[0][2] - M[2][0]) / 2, (M[1][0] - M[0][1]) / 2]
+
+
+def _warped(
+    ops: Arithmetic,
+    derivation: GroupDerivation,
+    K: Matrix,
+    E: Matrix,
+    phi: Scalar,
+    axis: Vector,
+    kappa: float,
+    sign: Scalar,
+) -> tuple[Scalar, Vector, Matrix]:
+    """Phi_q, d phi at T_q(E), and the turn exp(q kappa phi u)."""
+    turn = exp_matrix(ops, derivation, scaled(sign * ops.constant(kappa) * phi, axis))
+    T = matmul(E, turn)
+    value = dot([x for row in K for x in row], [(1 if i == j else 0) - T[i][j] for j in range(3) for i in range(3)]) / 2
+    return value, _slope(K, T), turn
+
+
+def _levels(values: Array, u: Array) -> tuple[Array, Array]:
+    """A_i and m_i in the eigenbasis."""
+    A = np.sum(values) - values
+    square = u**2
+    m = np.array([A[j] * square[k] + A[k] * square[j] for j, k in ((1, 2), (2, 0), (0, 1))])
+    return A, m
+
+
+def _warped_level(kappa: float, A: float, m: float) -> float:
+    """x = cos^2(kappa x/2) A + sin^2(kappa x/2) m, between m and A."""
+
+    def off(x: float) -> float:
+        c = np.cos(kappa * x / 2) ** 2
+        return float(x - c * A - (1 - c) * m)
+
+    low, high = min(A, m), max(A, m)
+    return float(brentq(off, low - 1e-9, high + 1e-9, xtol=1e-14)) if high > low else A
+
+
+def _warp(K: Array, kappa: Any, direction: Any) -> tuple[tuple[float, ...], float, float, tuple[float, ...]]:
+    """u in body axes, kappa, kappa_max and the gaps.
+
+    Raises:
+        InputError, ShapeError: as `hybrid_law`.
+    """
+    values, axes = np.linalg.eigh(K)
+    sums = np.sum(values) - values
+    if np.min(np.abs(np.diff(sums))) <= _DISTINCT * np.max(sums):
+        listed = ", ".join(f"{x:.6g}" for x in values)
+        raise InputError(
+            f"hybrid_law: K_p has the eigenvalues {listed}; two are equal, which gives critical circles and no gap: make them differ"
+        )
+    if direction is None:
+        u = axes @ np.sqrt(_best_square(sums))
+    else:
+        u = np.asarray(direction, dtype=float)
+        if u.shape != (3,) or not np.all(np.isfinite(u)) or not np.any(u):
+            raise ShapeError(f"hybrid_law: direction has shape {u.shape}; give three numbers, not all zero")
+        u = u / np.linalg.norm(u)
+    hat = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+    singular = np.linalg.svd(hat @ K, compute_uv=False)
+    most = float(2 / (singular[0] + singular[1]))
+    warp = 0.9 * most if kappa is None else float(kappa)
+    if not 0 < warp < most:
+        raise InputError(
+            f"hybrid_law: kappa = {warp:g} must lie between 0 and kappa_max = {most:.6g}, where the warp folds"
+        )
+    A, m = _levels(values, axes.T @ u)
+    gaps = tuple(float(np.sin(warp * _warped_level(warp, a, b)) ** 2 * (a - b)) for a, b in zip(A, m, strict=True))
+    if min(gaps) <= 0:
+        raise InputError(
+            f"hybrid_law: direction = {u.tolist()} leaves no gap (the least is {min(gaps):.6g}); without it the best is taken"
+        )
+    return tuple(float(x) for x in u), warp, most, gaps
+
+
+def _best_square(A: Array) -> Array:
+    """(u_i^2) that makes the least of A_i - m_i largest: maximise s with A_i - (A_j w_k + A_k w_j) >= s, w >= 0, sum w = 1."""
+    rows = np.zeros((3, 4))
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        rows[i, k], rows[i, j], rows[i, 3] = A[j], A[k], 1
+    found = linprog(
+        [0, 0, 0, -1], A_ub=rows, b_ub=A, A_eq=[[1, 1, 1, 0]], b_eq=[1], bounds=[(0, 1)] * 3 + [(None, None)]
+    )
+    square = np.maximum(found.x[:3], 0)
+    return np.asarray(square / np.sum(square))

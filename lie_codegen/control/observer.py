@@ -1,0 +1,276 @@
+"""Observers on a group from vectors that the body sees, and the bias of its rate sensor.
+
+Outputs y_i = X^-1 c_i: directions c = z (on SE(n) (z, 0)), landmarks c = (p, 1). The sensor of velocity shows u_y = u + b.
+
+    f = sum k_i |X^ y_i - c_i|^2/2,   grad_a = sum k_i (A_a X^ y_i).(X^ y_i - c_i)
+    X^' = X^ hat(u_y - b^ - k_P Ad_(X^^-1) grad),   b^' = k_I Ad_(X^)^T grad,   V' = -k_P |grad|^2,  V = f + |b - b^|^2/(2 k_I)
+
+On SO(3) this is X^' = X^ hat(omega_y - b^ + k_P s), b^' = -k_I s with s = sum k_i y_i x y^_i, y^_i = X^^T z_i; the order in s is the sign error
+to expect. Without bias the path of X^ X^-1 does not depend on u. The step is X^ <- X^ exp(h (...)), which stays on the group.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from scipy.linalg import solve_discrete_lyapunov
+
+from lie_codegen.arrays import Array
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.positive_matrix import positive_number, real_number
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.exponential import exp_matrix
+from lie_codegen.groups.maps.guard import nan_off_group
+from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import Matrix, Vector, dot, matmul, matvec, minus, number, plus, scaled
+
+#: Singular values of {A_a c_i}, relative to the largest, that count as zero.
+_RANK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Observer(Kernel):
+    """The step (X_hat, bias, u, y, h) -> (X_hat_next, bias_next), with what is known of it near rest at X = 1.
+
+    Attributes:
+        basis: (n, d, d) the matrices A_a of its group.
+        vectors: (k, d) the c_i.
+        weights: (k,) k_i.
+        k_p, k_i: gains.
+    """
+
+    basis: tuple[Any, ...] = field(default=(), repr=False)
+    vectors: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
+    weights: tuple[float, ...] = field(default=(), repr=False)
+    k_p: float = 0.0
+    k_i: float = 0.0
+    measured: int = field(default=0, repr=False)
+
+    @property
+    def kernel(self) -> Kernel:
+        """The step itself."""
+        return self
+
+    @property
+    def directions(self) -> tuple[tuple[float, ...], ...]:
+        """The c of y = X^-1 c, for a loop."""
+        return self.vectors
+
+    @cached_property
+    def moved(self) -> Array:
+        """(k, n, d) A_a c_i: how the outputs change."""
+        return np.asarray(np.einsum("aij,kj->kai", np.array(self.basis), np.array(self.vectors)))
+
+    @cached_property
+    def A(self) -> Array:
+        """(n, n) Hessian of f at X^ = X = 1: sum k_i (A_a c_i).(A_b c_i); on SO(3) sum k_i (1 - z_i z_i^T)."""
+        return np.asarray(np.einsum("k,kai,kbi->ab", np.array(self.weights), self.moved, self.moved))
+
+    @cached_property
+    def poles(self) -> Array:
+        """The roots of s^2 + k_P a s + k_I a, a the eigenvalues of A; -k_P a without bias."""
+        values = np.linalg.eigvalsh(self.A)
+        if self.k_i == 0:
+            return np.asarray(-self.k_p * values, dtype=complex)
+        return np.concatenate([np.roots([1, self.k_p * a, self.k_i * a]) for a in values]).astype(complex)
+
+    def covariance(self, *, step: float, direction_noise: float, rate_noise: float = 0.0) -> Array:
+        """(2n, 2n) steady covariance of (attitude error, bias error) at rest at X = 1, by the discrete Lyapunov equation.
+
+            F = [[1 - h k_P A, h], [-h k_I A, 1]],   noise of the vectors sum k_i^2 sd^2 G_i G_i^T through [h k_P; h k_I],  h^2 sg^2 of the rate
+
+        (n, n) without bias.
+
+        Raises:
+            InputError: the step is too long for these gains, or the vectors do not determine the state.
+        """
+        h, n = float(step), len(self.A)
+        seen = self.moved[:, :, : self.measured]
+        vectors = direction_noise**2 * np.einsum("k,kai,kbi->ab", np.array(self.weights) ** 2, seen, seen)
+        if self.k_i == 0:
+            F, G = np.eye(n) - h * self.k_p * self.A, h * self.k_p * np.eye(n)
+            rate = h**2 * rate_noise**2 * np.eye(n)
+        else:
+            F = np.block([[np.eye(n) - h * self.k_p * self.A, h * np.eye(n)], [-h * self.k_i * self.A, np.eye(n)]])
+            G = np.vstack([h * self.k_p * np.eye(n), h * self.k_i * np.eye(n)])
+            rate = np.zeros((2 * n, 2 * n))
+            rate[:n, :n] = h**2 * rate_noise**2 * np.eye(n)
+        radius = float(np.max(np.abs(np.linalg.eigvals(F))))
+        if radius >= 1 - 1e-12:
+            raise InputError(
+                f"observer: with step = {h:g} the error does not die out (spectral radius {radius:.6g}): no steady covariance; a shorter "
+                "step, or more vectors"
+            )
+        return np.asarray(solve_discrete_lyapunov(F, G @ vectors @ G.T + rate))
+
+
+@kernel_factory(group=as_group)
+def observer(
+    group: GroupLike,
+    *,
+    directions: Any = None,
+    points: Any = None,
+    outputs: Any = None,
+    weights: Any = None,
+    k_p: Any = 1,
+    k_i: Any = 0,
+    reduced: bool = False,
+    name: str = "observer",
+) -> Observer:
+    """(X_hat, bias, u, y, h) -> (X_hat_next, bias_next), y one row a vector: first the directions, then the points.
+
+    Args:
+        group: SO(n) with directions, SE(n) with directions and points, or any real group with outputs.
+        directions: (k, n) inertial vectors z, taken as given: y = R^T z.
+        points: (k, n) inertial positions p of landmarks: y = R^T (p - position), p as the body sees it.
+        outputs: (k, d) vectors c of any group: y = X^-1 c.
+        weights: (k,) k_i, positive; 1 if not given.
+        k_p: k_P [1/s]; k_i: k_I [1/s^2], 0 for no bias.
+        reduced: take vectors that do not determine the state, as one direction: the heading is then not observed.
+        name: C identifier.
+
+    Raises:
+        ShapeError, InputError: vectors or weights that do not fit; vectors that do not determine the state.
+    """
+    group = as_group(group, "observer")
+    if group.is_complex:
+        raise InputError(f"observer: {group.name} is complex; vectors that a body sees are real")
+    d = group.degree
+    rigid = all(not any(matrix[d - 1, :]) for matrix in group.exact_basis) and outputs is None
+    seen = d - 1 if rigid else d
+    vectors = _vectors(directions, points, outputs, d, rigid=rigid)
+    count = len(vectors)
+    k = [positive_number(w, f"weights[{i}]") for i, w in enumerate(_weights(weights, count))]
+    p, i_gain = positive_number(k_p, "k_p"), real_number(k_i, "k_i")
+    if not i_gain >= 0:
+        raise InputError(f"k_i = {i_gain} must not be negative")
+    floats = tuple(tuple(float(x) for x in c) for c in vectors)
+    rank, n = _rank(group, floats), group.dim
+    if rank < n and not reduced:
+        raise InputError(
+            f"observer: {count} vector(s) determine {rank} of {n} components on {group.name}: "
+            + ("of one direction the turn about it is not seen" if count == 1 else "another vector is needed")
+            + "; reduced=True takes what there is"
+        )
+    derivation, real = GroupDerivation(group), RealMatrices(group)
+
+    def body(ops: Arithmetic, X_hat: Any, bias: Vector, u: Vector, y: Matrix, h: Scalar) -> tuple[Any, ...]:
+        matrices = GroupMatrices(ops, real)
+        X = matrices.read(X_hat)
+        correction, rate = corrections(
+            ops, real, X, y, [[number(ops, x) for x in c] for c in vectors], [number(ops, w) for w in k], seen
+        )
+        velocity = minus(minus(u, bias), scaled(number(ops, p), correction))
+        moved = matmul(X, exp_matrix(ops, derivation, scaled(h, velocity)))
+        return moved, plus(bias, scaled(h * number(ops, i_gain), rate)) if i_gain != 0 else list(bias)
+
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        X = random_element(group, WeiNormanData(group), rng)
+        flat = [[rng.uniform(-0.1, 0.1) for _ in range(n)] for _ in range(2)]
+        return X, *flat, [[rng.uniform(-1, 1) for _ in range(seen)] for _ in range(count)], rng.uniform(0, 0.05)
+
+    made = Observer(
+        name=name,
+        namespace=group.name,
+        inputs=(
+            matrix_port(group, "X_hat", "estimate"),
+            Port("bias", (n,), velocity_units(group), description="estimate of the bias"),
+            Port("u", (n,), velocity_units(group), description="measured body velocity, bias included"),
+            Port("y", (count, seen), description="measured vectors, one a row"),
+            Port("h", (), "s", description="step"),
+        ),
+        outputs=(matrix_port(group, "X_hat_next"), Port("bias_next", (n,), velocity_units(group))),
+        body=body,
+        formula="X^ <- X^ exp(h (u - b^ - k_P Ad_(X^^-1) grad)), b^ <- b^ + h k_I Ad_(X^)^T grad",
+        source="gradient observer on a group; V' = -k_P |grad|^2",
+        sampler=sampler,
+        basis=tuple(tuple(map(tuple, matrix)) for matrix in group.basis.tolist()),
+        vectors=floats,
+        weights=tuple(float(w) for w in k),
+        k_p=float(p),
+        k_i=float(i_gain),
+        measured=seen,
+    )
+    return nan_off_group(made, group, ("X_hat",))  # type: ignore[return-value]
+
+
+def corrections(
+    ops: Arithmetic,
+    real: RealMatrices,
+    X: Matrix,
+    y: Matrix,
+    vectors: Sequence[Sequence[Scalar]],
+    weights: Sequence[Scalar],
+    seen: int,
+) -> tuple[Vector, Vector]:
+    """Ad_(X^-1) grad and Ad_X^T grad."""
+    matrices, n = GroupMatrices(ops, real), real.group.dim
+    basis = [matrices.hat([int(a == b) for b in range(n)]) for a in range(n)]
+    grad: Vector = [0] * n
+    for c, row, weight in zip(vectors, y, weights, strict=True):
+        shown = [
+            *row[:seen],
+            *c[seen:],
+        ]  # on SE(n) the last entry, 0 of a direction and 1 of a point, is no measurement
+        v = matvec(X, shown)
+        off = scaled(weight, minus(v, c))
+        grad = plus(grad, [dot(matvec(A, v), off) for A in basis])
+    inverse = matrices.inverse(X)
+    back = matrices.Ad(inverse, X, grad)
+    columns = [matrices.Ad(X, inverse, [int(a == b) for b in range(n)]) for a in range(n)]
+    return back, [dot(column, grad) for column in columns]
+
+
+def _vectors(directions: Any, points: Any, outputs: Any, d: int, *, rigid: bool) -> list[list[sp.Expr]]:
+    """The c_i, exact."""
+    found: list[list[sp.Expr]] = []
+    size = d - 1 if rigid else d
+    for given, last, what in ((directions, 0, "directions"), (points, 1, "points"), (outputs, None, "outputs")):
+        if given is None:
+            continue
+        if what == "points" and not rigid:
+            raise InputError("observer: points are seen on SE(n); on SO(n) give directions")
+        rows = given.tolist() if hasattr(given, "tolist") else list(given)
+        rows = rows if (rows and isinstance(rows[0], list | tuple)) or hasattr(rows[0], "tolist") else [rows]
+        for i, row in enumerate(rows):
+            entries = [real_number(x, f"{what}[{i}]") for x in (row.tolist() if hasattr(row, "tolist") else row)]
+            if len(entries) != (d if last is None else size):
+                raise ShapeError(
+                    f"observer: {what}[{i}] has {len(entries)} entries; give {d if last is None else size}"
+                )
+            if last == 0 and not any(entries):
+                raise InputError(f"observer: directions[{i}] is zero")
+            found.append([*entries, sp.Integer(last)] if rigid and last is not None else entries)
+    if not found:
+        raise InputError("observer: give directions, points or outputs")
+    return found
+
+
+def _weights(weights: Any, count: int) -> list[Any]:
+    if weights is None:
+        return [1] * count
+    values = weights.tolist() if hasattr(weights, "tolist") else weights
+    values = list(values) if isinstance(values, list | tuple) else [values] * count
+    if len(values) != count:
+        raise ShapeError(f"observer: {len(values)} weights for {count} vectors")
+    return values
+
+
+def _rank(group: MatrixGroup, vectors: Sequence[Sequence[float]]) -> int:
+    """Of {A_a c_i}: n where the outputs determine the state near any place."""
+    moved = np.einsum("aij,kj->aki", group.basis, np.array(vectors)).reshape(group.dim, -1)
+    values = np.linalg.svd(moved, compute_uv=False)
+    return int(np.sum(values > _RANK * max(1e-300, values[0])))

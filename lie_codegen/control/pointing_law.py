@@ -1,0 +1,104 @@
+"""Pointing a body axis at a direction, from the direction as the body sees it and the angular velocity alone.
+
+    phi = k_p (1 - y.b),   torque = -k_p y x b - K_d omega (+ c omega x I omega),   y = R^T z,   y' = y x omega
+    V = phi + omega.I omega/2,   V' = -omega.K_d omega
+
+as d/dt y.b = (y x omega).b = -omega.(y x b). No attitude is needed. The spin about y is damped too; with spin="free" K_d becomes
+(1 - y y^T) K_d (1 - y y^T), and the momentum y.I omega about y is kept: all torques are perpendicular to y then.
+Geyer, The Attitude Control Problem, section 9: the case of (7), one direction.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from lie_codegen.control.attitude import gyroscopic_factor
+from lie_codegen.control.attitude_law import _rotation
+from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number, real_number
+from lie_codegen.groups.maps.admission import NEAR_GROUP
+from lie_codegen.groups.maps.guard import kept_where
+from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.definition import kernel_factory
+from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import Vector, constant_matrix, cross, dot, matvec, minus, negative, number, plus, scaled
+
+_SPINS = ("damped", "free")
+
+
+@kernel_factory(units={"k_p": "N m/rad", "K_d": "N m s/rad", "inertia": "kg m^2"})
+def pointing_law(
+    axis: Sequence[Any] = (0, 0, 1),
+    *,
+    inertia: Any = None,
+    k_p: Any = 1,
+    K_d: Any = 1,
+    gyroscopic: str = "none",
+    spin: str = "damped",
+    name: str = "pointing_law",
+) -> Kernel:
+    """(y, omega) -> (torque): the body axis b is turned towards the direction y = R^T z that the body sees.
+
+    Args:
+        axis: b in body axes, of any length.
+        inertia: [kg m^2], for gyroscopic "cancel" and "double".
+        k_p: [N m/rad].
+        K_d: [N m s/rad], a number, a diagonal or a matrix.
+        gyroscopic: "none" (the law needs no inertia), "cancel" or "double", as `attitude_law`.
+        spin: "damped", or "free": the momentum about y is kept.
+        name: C identifier.
+
+    Raises:
+        ShapeError, InputError: an axis that is zero or not three numbers, gains that are not positive, an inertia that is missing.
+    """
+    b = _unit(axis, "axis")
+    p, D = positive_number(k_p, "k_p"), positive_matrix(K_d, 3, "K_d")
+    factor = gyroscopic_factor(gyroscopic)
+    if spin not in _SPINS:
+        raise InputError(f"spin {spin!r} is not known; choose one of {', '.join(_SPINS)}")
+    if factor and inertia is None:
+        raise InputError(f"gyroscopic {gyroscopic!r} needs the inertia; 'none' does not")
+    metric = None if inertia is None else body_inertia(inertia)
+
+    def body(ops: Arithmetic, y: Vector, omega: Vector) -> tuple[Any, ...]:
+        target = [number(ops, entry) for entry in b]
+        seen = minus(omega, scaled(dot(y, omega), y)) if spin == "free" else omega
+        damping = matvec(constant_matrix(ops, D), seen)
+        damping = minus(damping, scaled(dot(y, damping), y)) if spin == "free" else damping
+        torque = plus(scaled(number(ops, -p), cross(y, target)), negative(damping))
+        if metric is not None and factor:
+            torque = plus(torque, scaled(factor, cross(omega, matvec(constant_matrix(ops, metric), omega))))
+        of_unit_length = ops.less(ops.fabs(dot(y, y) - 1), ops.constant(2 * NEAR_GROUP))
+        return (kept_where(ops, [of_unit_length], torque),)
+
+    return Kernel(
+        name=name,
+        namespace="so3",
+        inputs=(
+            Port("y", (3,), description="measured direction R' z in the body frame, of unit length"),
+            Port("omega", (3,), "rad/s", description="body angular velocity"),
+        ),
+        outputs=(Port("torque", (3,), "N m", description="body torque tau of I omega' = -omega x I omega + tau"),),
+        body=body,
+        formula=f"tau = -k_p y x b - K_d omega + {factor} omega x I omega; spin {spin}",
+        source="Geyer, The Attitude Control Problem, section 9; Bullo and Murray, CIT-CDS 97-003, Lemma 3.3",
+        sampler=lambda rng: ([row[2] for row in _rotation(rng)], _drawn(rng)),
+    )
+
+
+def _drawn(rng: random.Random) -> list[float]:
+    return [rng.uniform(-1, 1) for _ in range(3)]
+
+
+def _unit(value: Sequence[Any], name: str) -> list[sp.Expr]:
+    if len(value) != 3:
+        raise ShapeError(f"{name} has {len(value)} entries; give three")
+    exact = [real_number(entry, f"{name}[{i}]") for i, entry in enumerate(value)]
+    length = sp.sqrt(sum(entry**2 for entry in exact))
+    if length == 0:
+        raise InputError(f"{name} is zero; give a direction")
+    return [entry / length for entry in exact]
