@@ -65,6 +65,8 @@ from .control import integral_law as integral_law
 from .control import invariance as invariance
 from .control import linear_loop as linear_loop
 from .control import loop_margins as loop_margins
+from .control import manifold as manifold
+from .control import manifold_law as manifold_law
 from .control import observer as observer
 from .control import output_feedback_law as output_feedback_law
 from .control import pointing_law as pointing_law

@@ -22,6 +22,8 @@ from .law_file import read_law as read_law
 from .linearisation import linear_loop as linear_loop
 from .linearisation import rigid_gains as rigid_gains
 from .loop_margins import loop_margins as loop_margins
+from .manifold import manifold as manifold
+from .manifold_law import manifold_law as manifold_law
 from .observer import observer as observer
 from .output_feedback import output_feedback_law as output_feedback_law
 from .pointing_law import pointing_law as pointing_law

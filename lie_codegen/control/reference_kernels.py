@@ -8,6 +8,8 @@ from typing import Any, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lie_codegen.control.curve_reference import CurveReference, curve_reference
+from lie_codegen.control.manifold import Manifold
 from lie_codegen.control.plan_reference import Planned, plan_reference
 from lie_codegen.control.reference_motion import (
     TIME,
@@ -17,6 +19,7 @@ from lie_codegen.control.reference_motion import (
     WaypointReference,
     formula_reference,
 )
+from lie_codegen.control.retimed_plan import retimed
 from lie_codegen.control.waypoints import waypoint_reference
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -155,6 +158,14 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
     ]
 
 
+def _space(group: Any) -> Any:
+    return group if isinstance(group, Manifold) else as_group(group, "reference")
+
+
+@overload
+def reference(group: Manifold, formulas: Sequence[Any]) -> CurveReference: ...
+
+
 @overload
 def reference(
     group: GroupLike, formulas: Planned, *, smoothing: float | None = None, tolerance: float = 1e-8
@@ -171,26 +182,33 @@ def reference(
     start: Any = None,
     smoothing: float | None = None,
     tolerance: float = 1e-8,
+    plan: Planned | None = None,
+    duration: float | None = None,
 ) -> Reference: ...
 
 
-@record_factory(group=as_group, times=doubles, waypoints=doubles, start=doubles)
+@record_factory(group=_space, times=doubles, waypoints=doubles, start=doubles)
 def reference(
-    group: GroupLike,
+    group: GroupLike | Manifold,
     formulas: Sequence[Any] | Planned | None = None,
     *,
+    plan: Planned | None = None,
+    duration: float | None = None,
     times: ArrayLike | None = None,
     waypoints: ArrayLike | None = None,
     start: Any = None,
     smoothing: float | None = None,
     tolerance: float = 1e-8,
-) -> Reference:
+) -> Reference | CurveReference:
     """A reference from formulas of t, from a plan, or from waypoints; its velocity and acceleration are derived.
 
     Args:
-        group: the group.
+        group: the group; or a manifold, then formulas are its N coordinates.
         formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n). Or the plan
             of a manoeuvre, as `steer` makes it: then the reference says its `error` and what it rounds off (`PlanReference`).
+        plan: the same.
+        duration: with a plan without drift: the time [s] it is flown in, from rest to rest, X_d(t) = X(s(t)) with quintics s that stop
+            wherever the plan's controls jump: nothing is rounded off.
         times, waypoints: (k,) and (k, d, d), instead of formulas.
         start: (d, d) for formulas.
         smoothing: for a plan: the time before and after a jump of the controls in which it is rounded off [s]; a hundredth of the
@@ -200,7 +218,17 @@ def reference(
     Raises:
         InputError: both or neither given; else as `formula_reference`, `plan_reference` and `waypoint_reference`.
     """
+    if isinstance(group, Manifold):
+        return _on_manifold(group, formulas)
     group = as_group(group, "reference")
+    if plan is not None:
+        if formulas is not None:
+            raise InputError("reference: give the plan as plan= or in the place of formulas, not both")
+        formulas = plan
+    if duration is not None:
+        if not all(hasattr(formulas, name) for name in ("X", "u", "duration")):
+            raise InputError("reference: duration= goes with a plan")
+        formulas = retimed(cast(Planned, formulas), float(duration))
     if (formulas is None) == (times is None or waypoints is None):
         raise InputError(f"a reference on {group.name} is given by formulas, by a plan, or by times and waypoints")
     if all(hasattr(formulas, name) for name in ("X", "u", "duration")):
@@ -213,3 +241,21 @@ def reference(
         formulas = cast(Sequence[Any], formulas)
         return formula_reference(group, formulas, start=start)
     return waypoint_reference(group, np.asarray(times), np.asarray(waypoints))
+
+
+def _on_manifold(space: Manifold, formulas: Any) -> CurveReference:
+    """r(t), which must stay on the manifold: r' and r'' are its derivatives, so that J r' = 0 and r'' has its part across.
+
+    Raises:
+        InputError: not N formulas, or it leaves the manifold; with the figure and the time.
+    """
+    if isinstance(formulas, str) or not isinstance(formulas, list | tuple) or len(formulas) != space.size:
+        raise InputError(f"a reference on {space.name} is {space.size} formulas of t, one a coordinate")
+    made = curve_reference(formulas)
+    c, _ = space.numeric
+    for t in np.linspace(0, 10, 61):
+        point = np.array([float(entry.subs(TIME, float(t))) for entry in made.r])
+        off = np.max(np.abs(np.array(c(point), dtype=float)), initial=0.0)
+        if not off <= 1e-9 * max(1.0, float(np.max(np.abs(point)))):
+            raise InputError(f"the reference leaves the manifold {space.name}: c(r) = {off:.3g} at t = {t:.6g}, not 0")
+    return made
