@@ -156,6 +156,7 @@ from .mechanics import simulate_driven as simulate_driven
 from .mechanics import spatial_momentum_kernel as spatial_momentum_kernel
 from .mechanics import symmetric_product as symmetric_product
 from .mechanics import variational_step as variational_step
+from .mechanics import vibration_feedback as vibration_feedback
 from .mechanics import vibrational_average as vibrational_average
 from .mechanics import vibrational_fields as vibrational_fields
 from .mechanics import vibrational_kernels as vibrational_kernels

@@ -17,6 +17,7 @@ from .relative_equilibria import relative_equilibria as relative_equilibria
 from .relative_equilibria import relative_equilibrium as relative_equilibrium
 from .routh import routh_reduce as routh_reduce
 from .variational_step import variational_step as variational_step
+from .vibration_feedback import vibration_feedback as vibration_feedback
 from .vibrational_average import vibrational_average as vibrational_average
 from .vibrational_feedback import design_feedback as design_feedback
 from .vibrational_fields import vibrational_fields as vibrational_fields

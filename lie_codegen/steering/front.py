@@ -25,6 +25,7 @@ from lie_codegen.steering.ocp.steered import asks_open, open_plan
 from lie_codegen.steering.options import check_options
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.start import placed, seen_from
+from lie_codegen.steering.symmetric_product.method import symmetric_product_plan
 from lie_codegen.steering.task import make_task
 
 
@@ -77,6 +78,10 @@ def steer(
     amplitude: str | None = None,
     harmonics: int | None = None,
     order: int | None = None,
+    cycles: float | None = None,
+    forces: Any = None,
+    damping: Any = None,
+    compare: bool | None = None,
     exact: bool | None = None,
     threads: int | None = None,
     steps: int | None = None,
@@ -107,6 +112,8 @@ def steer(
             "loops": a straight part, a loop for each bracket, a figure of eight for each bracket of brackets, in turn, retuned;
             "optimal": minimum energy, exact extremals;
             "ocp": cost=, terminal_cost=, constraints=, parameters= of one's own, as `lc.ocp` has them, with the target as end;
+            "symmetric_product": torques of a body at rest, fewer than its dimensions: oscillations whose symmetric products push in the missing
+                directions, retuned to hit the target exactly; no nonlinear program, milliseconds, not cheap;
             "transcription": bounds, rates, obstacles, drift, torques, via points, periodic controls, minimum time;
             "feedback": in steps, each planned from the measured state.
         tolerance: endpoint error |log(target^-1 X)| below which the plan counts as solved.
@@ -145,11 +152,16 @@ def steer(
         parameters: {name: value} of the formulas; none (ocp).
         quadrature: "trapezoid" (default), "left" or "simpson" (ocp).
         integrator: "rkmk4" (default) or "midpoint" (ocp).
-        form: "product" (default), (60), or "single", (66) (four_phase).
+        form: "product" (default), (60), or "single", (66) (four_phase); "oscillation" (default) or "primitives", a sequence of motions along
+            decoupling fields (symmetric_product).
         q: periods of the second phase; by the task (four_phase).
         amplitude: "auto" (default), "free" or as the paper's (four_phase).
         harmonics: harmonics of the controls; 2 (area_rule).
         order: order of averaging; 2 (area_rule).
+        cycles: of the slowest oscillation, not necessarily whole; from 4 down while the cost falls (symmetric_product).
+        forces: (m, n) covectors in place of controls, for thrusters that are no basis elements (symmetric_product).
+        damping: D of the force -D xi, a number, (n,) or (n, n); 0 (symmetric_product).
+        compare: tell the cost of the transcription's torques beside, `details["transcription_cost"]`; False (symmetric_product).
         exact: retuned to hit the target; True (circle, loops, area_rule).
         threads: processor threads; 1 (optimal).
         steps: steps, each planned from the measured state; 8 (feedback).
@@ -216,6 +228,10 @@ def steer(
             "amplitude": amplitude,
             "harmonics": harmonics,
             "order": order,
+            "cycles": cycles,
+            "forces": forces,
+            "damping": damping,
+            "compare": compare,
             "exact": exact,
             "threads": threads,
             "steps": steps,
@@ -253,6 +269,8 @@ def _planned(
         )
     if asks_direct(method, target, controls, options):
         return direct_plan(group, target, controls, duration, tolerance, options)
+    if method == "symmetric_product" and options.get("start") is None:
+        return symmetric_product_plan(group, target, controls, duration, tolerance, options)
     if options.get("start") is not None:
         return _from(group, target, controls, duration, method, tolerance, options)
     methods = {**OPEN_LOOP, "feedback": feedback}

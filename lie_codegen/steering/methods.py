@@ -67,7 +67,9 @@ def solver_of(methods: Mapping[str, Method], method: str, options: Mapping[str, 
         method = "transcription" if set(options) - _options_of(optimal) else "optimal"
     solver = methods.get(method)
     if solver is None:
-        raise SteeringInputError(f"no method {method!r}; there are auto, {', '.join(sorted([*methods, 'direct']))}")
+        raise SteeringInputError(
+            f"no method {method!r}; there are auto, {', '.join(sorted([*methods, 'direct', 'symmetric_product']))}"
+        )
     known = _options_of(solver)
     unknown = sorted(set(options) - known)
     if unknown:

@@ -14,7 +14,7 @@ _WHOLE = (
     "intervals", "pieces", "starts", "rounds", "iterations", "seed", "classes", "q", "harmonics", "order", "threads", "steps",
 )  # fmt: skip
 _MOST = 1_000_000
-_YES_OR_NO = ("rest", "periodic", "polish", "exact")
+_YES_OR_NO = ("rest", "periodic", "polish", "exact", "compare")
 _TEXTS = ("objective", "dynamics", "equation", "solver", "quadrature", "integrator", "form", "amplitude", "planner")
 #: Methods that take a drift that depends on time.
 _TIMED_DRIFT = ("auto", "direct")
