@@ -162,6 +162,7 @@ from .mechanics import vibrational_fields as vibrational_fields
 from .mechanics import vibrational_kernels as vibrational_kernels
 
 # pictures
+from .pictures import plot_loops as plot_loops
 from .pictures import plot_plan as plot_plan
 from .pictures import view as view
 

@@ -6,17 +6,19 @@ import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Never, overload
+from typing import Any, NamedTuple, Never, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.control.curve_reference import CurveReference, check_curve
 from lie_codegen.control.disturbance import ForceBody
 from lie_codegen.control.loop_arguments import LoopArguments, loop_arguments
 from lie_codegen.control.loop_error import loop_error
 from lie_codegen.control.loop_library import loop_library, loop_numbers, several
+from lie_codegen.control.loop_package import loop_parts
 from lie_codegen.control.loop_run import Run, noise_stream, refined
 from lie_codegen.control.loop_states import initial_own, own_states
 from lie_codegen.control.reference_check import check_reference
@@ -66,6 +68,29 @@ class ClosedLoop(Saved):
         logarithm; off groups the distance |q - r|.
         """
         return loop_error(self.group, self.X, self.X_d)
+
+    def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:
+        """The law as C with <name>_loop.c, which runs the first loop without noise, as `lc.generate(run, folder)` writes them.
+
+        Raises:
+            InputError: the loop has no law, or was loaded or unpickled: a file keeps the motion, not what made it.
+        """
+        made: LoopMaking | None = vars(self).get("_making")
+        if made is None:
+            raise InputError("generate: a loop that was loaded does not know its law any more; run closed_loop again")
+        return loop_parts(made.run, made.reference, made.parts, name, real)
+
+    def _made_by(self, making: LoopMaking) -> ClosedLoop:
+        object.__setattr__(self, "_making", making)  # beside the fields: neither == nor a pickle sees it
+        return self
+
+
+class LoopMaking(NamedTuple):
+    """What ran a loop."""
+
+    run: Run
+    reference: Any
+    parts: int
 
 
 @overload
@@ -289,7 +314,7 @@ def _result(run: Run, told: LoopArguments, found: Array, count: int, error: floa
     shared = {name: value for name, value in states.items() if name not in outputs}
     return ClosedLoop(
         times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group
-    )
+    )._made_by(LoopMaking(run, told.reference, count))
 
 
 def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:

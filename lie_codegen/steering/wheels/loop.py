@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -184,7 +185,7 @@ def closed_loop_of(
         violation=violation(system, speeds, torques),
         steps=count * int(substeps),
     )
-    return run if many else _only(run)
+    return _by_times(run) if many else _only(run)
 
 
 def _samples(t: ArrayLike, sample: float | None) -> tuple[Array, float, int]:
@@ -289,8 +290,13 @@ def _torques(
     return np.asarray(found.torques).reshape(runs, count, -1)
 
 
-def _only(run: WheelRun) -> WheelRun:
-    from dataclasses import replace
+def _by_times(run: WheelRun) -> WheelRun:
+    """Times first, then runs, as `lc.closed_loop` has them."""
+    names = ("X", "omega", "speeds", "torques", "momentum", "error")
+    parts: dict[str, Any] = {name: np.ascontiguousarray(np.swapaxes(getattr(run, name), 0, 1)) for name in names}
+    return replace(run, **parts)
 
+
+def _only(run: WheelRun) -> WheelRun:
     parts = {name: getattr(run, name)[0] for name in ("X", "omega", "speeds", "torques", "momentum", "error")}
     return replace(run, **parts)

@@ -28,16 +28,16 @@ _MOST_STEPS, _LARGEST_MOVE = 2**20, 0.25
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WheelRun(Value):
-    """A motion with wheels; with a leading axis of runs in a batch.
+    """A motion with wheels; of N runs with an axis of runs behind that of the times.
 
     Attributes:
         t: (k,) times.
-        X: (..., k, d, d) attitudes.
-        omega: (..., k, 3) body rates in body axes. [rad/s]
-        speeds: (..., k, p) wheel speeds. [rad/s]
-        torques: (..., k, p) motor torques at the times, or None where speeds were given and have no rate. [N m]
-        momentum: (..., k, 3) total angular momentum in space. [N m s]
-        error: (..., k) angle from the attitude asked for, in rad, or None.
+        X: (k, d, d) attitudes; (k, N, d, d) of N runs, and so on below.
+        omega: (k, 3) body rates in body axes. [rad/s]
+        speeds: (k, p) wheel speeds. [rad/s]
+        torques: (k, p) motor torques at the times, or None where speeds were given and have no rate. [N m]
+        momentum: (k, 3) total angular momentum in space. [N m s]
+        error: (k,) angle from the attitude asked for, in rad, or None.
         violation: {"speeds": .., "torques": ..} by how much limits are exceeded at the times; 0.0 where they are kept.
         steps: integration steps; error_estimate: on the entries of X, NaN for a loop.
     """
