@@ -15,9 +15,9 @@ from .gait_design import gait as gait
 from .kernels import averaged_kernels as averaged_kernels
 from .magnus import magnus as magnus
 from .order_check import order_check as order_check
+from .phase_system import phase_average as phase_average
 from .shape_connection import connection as connection
 from .shape_examples import example_connection as example_connection
-from .phase_system import phase_average as phase_average
 from .vibration_drift import VibrationLine as VibrationLine
 from .vibration_drift import line_drift as line_drift
 from .vibration_drift import spectral_drift as spectral_drift
