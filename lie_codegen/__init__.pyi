@@ -98,6 +98,7 @@ from .groups import chart_domain as chart_domain
 from .groups import commutator_free_step as commutator_free_step
 from .groups import controllability as controllability
 from .groups import covariance_kernels as covariance_kernels
+from .groups import device_source as device_source
 from .groups import from_brackets as from_brackets
 from .groups import from_matrices as from_matrices
 from .groups import fuse as fuse

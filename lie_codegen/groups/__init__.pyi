@@ -15,6 +15,7 @@ from .conventions import tangent_from as tangent_from
 from .conventions import tangent_to as tangent_to
 from .definition import from_brackets as from_brackets
 from .definition import from_matrices as from_matrices
+from .device_source import device_source as device_source
 from .jacobian import jacobian as jacobian
 from .kernels import group_kernels as group_kernels
 from .maps.barycentre import interpolate as interpolate
