@@ -173,15 +173,19 @@ from .rigid_body import euler_average as euler_average
 from .rigid_body import euler_perturbation as euler_perturbation
 from .rigid_body import explicit_inertia_change as explicit_inertia_change
 from .rigid_body import free_rigid_body as free_rigid_body
+from .rigid_body import free_rotation as free_rotation
 from .rigid_body import inertia_from_masses as inertia_from_masses
 from .rigid_body import limit_cycle_gains as limit_cycle_gains
 from .rigid_body import limit_cycles as limit_cycles
 from .rigid_body import momentum_directions as momentum_directions
 from .rigid_body import moving_parts as moving_parts
+from .rigid_body import plates as plates
 from .rigid_body import principal_body as principal_body
 from .rigid_body import slow_equilibria as slow_equilibria
 from .rigid_body import solve_actual as solve_actual
 from .rigid_body import solve_averaged as solve_averaged
+from .rigid_body import torque as torque
+from .rigid_body import tumbling_average as tumbling_average
 
 # signals
 from .signals import ParametricInput as ParametricInput

@@ -9,6 +9,7 @@ Coppola, Table 2 (right as printed, with phi = u / 4K, which the text does not d
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +18,7 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.errors import InputError
-from lie_codegen.mechanics.formulas import formula, parameter_values
+from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
 
 OMEGA, K_MODULUS, K_INTEGRAL, S_MEAN = sp.symbols("Omega k K S", positive=True)
@@ -141,6 +142,13 @@ def euler_perturbation(
     unset = sorted(name for name, value in values.items() if value.is_Symbol)
     if unset:
         raise InputError(f"parameter {unset[0]!r} has no value")
+    attitude = sorted(
+        {name for term in terms for name in names_in(term) if re.fullmatch("X[1-3][1-3]", name)} - set(values)
+    )
+    if attitude:
+        raise InputError(
+            f"{attitude[0]} is an entry of the attitude, which (Omega, k, phi) do not tell: use lc.tumbling_average"
+        )
     first, second, third = (formula(term, {**known, **values}, f"g_{n + 1}") for n, term in enumerate(terms))
     return EulerPerturbation(body, (first, second, third))
 

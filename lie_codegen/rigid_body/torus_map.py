@@ -1,0 +1,69 @@
+"""From osculating to mean H and D on the torus (phi, alpha hat): a Fourier series of the rates, divided by its frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.arrays import Array
+
+NODES = 24
+#: Divisors below this part of the smaller frequency are dropped, and listed.
+SMALLEST_DIVISOR = 0.02
+#: Resonances looked for: |n1| of the phase, |n2| of the precession.
+LARGEST = (12, 4)
+
+
+@dataclass(frozen=True)
+class TorusSeries:
+    """Rates of (H, D) on the torus as a Fourier series.
+
+    Attributes:
+        waves: (NODES, NODES, 4) coefficients, first index of phi.
+        rate, m: Lambda [1/s] and the mean precession [rad/s].
+        torque: the largest |N| met [N m].
+    """
+
+    waves: Any
+    rate: float
+    m: float
+    torque: float
+
+    def correction(self, phi: float, alpha: float) -> tuple[Array, list[tuple[int, int]]]:
+        """W (4,) at a point, osculating = mean + W, and the dropped (n1, n2)."""
+        n = np.fft.fftfreq(NODES, 1 / NODES)
+        n1, n2 = n[:, None], n[None, :]
+        divisor = 2 * np.pi * self.rate * n1 + self.m * n2
+        least = SMALLEST_DIVISOR * min(2 * np.pi * abs(self.rate), abs(self.m))
+        kept = (np.abs(divisor) >= least) & (np.abs(n1) < NODES / 2) & (np.abs(n2) < NODES / 2)
+        factor = np.zeros_like(divisor, dtype=complex)
+        factor[kept] = np.exp(1j * (2 * np.pi * n1 * phi + n2 * alpha))[kept] / (1j * divisor[kept])
+        small = ~kept & (np.abs(divisor) < least) & ((n1 != 0) | (n2 != 0))
+        dropped = [(int(n[i]), int(n[j])) for i, j in zip(*np.nonzero(small), strict=True)]
+        return np.real(np.einsum("ij,ijk->k", factor, self.waves)), dropped
+
+    def harmonic(self, n1: int, n2: int) -> float:
+        """|coefficient (n1, n2) of H'| over |mean of H'|; infinite where the mean is 0."""
+        mean = float(np.linalg.norm(self.waves[0, 0, :3].real))
+        size = float(np.linalg.norm(self.waves[n1 % NODES, n2 % NODES, :3]))
+        return 2 * size / mean if mean > 0 else float("inf") if size > 0 else 0.0
+
+
+def torus_series(sample: Callable[[Array, Array], tuple[Array, Array]], rate: float, m: float, b: Array) -> TorusSeries:
+    """The series of `sample(phi, alpha) -> (rates (.., 4), N (.., 3))`; alpha = alpha hat + sum b_n sin(4 pi n phi)."""
+    phi, hat = np.meshgrid(np.arange(NODES) / NODES, 2 * np.pi * np.arange(NODES) / NODES, indexing="ij")
+    orders = np.arange(1, len(b) + 1)
+    alpha = hat + np.sin(4 * np.pi * phi[..., None] * orders) @ b
+    rates, torque = sample(phi, alpha)
+    waves = np.fft.fft2(rates, axes=(0, 1)) / NODES**2
+    return TorusSeries(waves, rate, m, float(np.linalg.norm(torque, axis=-1).max()))
+
+
+def resonant_ratios() -> list[tuple[int, int]]:
+    """Coprime (n1, n2), n2 > 0, n1 of either sign."""
+    most1, most2 = LARGEST
+    signed = range(-most1, most1 + 1)
+    return [(n1, n2) for n2 in range(1, most2 + 1) for n1 in signed if n1 and np.gcd(abs(n1), n2) == 1]
