@@ -140,6 +140,7 @@ from .kernel import load as load
 from .mechanics import MomentumWheels as MomentumWheels
 from .mechanics import PointMassOscillator as PointMassOscillator
 from .mechanics import accessibility_rank as accessibility_rank
+from .mechanics import bracket_table as bracket_table
 from .mechanics import design_feedback as design_feedback
 from .mechanics import direction_observability as direction_observability
 from .mechanics import driven_step as driven_step
@@ -147,6 +148,7 @@ from .mechanics import euler_poincare_kernel as euler_poincare_kernel
 from .mechanics import feedback_kernels as feedback_kernels
 from .mechanics import lagrangian_kernels as lagrangian_kernels
 from .mechanics import lagrangian_system as lagrangian_system
+from .mechanics import lagrangian_variational_step as lagrangian_variational_step
 from .mechanics import linear_controllability as linear_controllability
 from .mechanics import mechanical_system as mechanical_system
 from .mechanics import relative_equilibria as relative_equilibria
@@ -158,6 +160,7 @@ from .mechanics import spatial_momentum_kernel as spatial_momentum_kernel
 from .mechanics import symmetric_product as symmetric_product
 from .mechanics import variational_step as variational_step
 from .mechanics import vibration_feedback as vibration_feedback
+from .mechanics import vibration_waveform as vibration_waveform
 from .mechanics import vibrational_average as vibrational_average
 from .mechanics import vibrational_fields as vibrational_fields
 from .mechanics import vibrational_kernels as vibrational_kernels

@@ -73,6 +73,12 @@ TARGETS = (
     Target("rigid_body_cost", "rigid_body_cost", "cost and error of averaging over 1/eps; elliptic kernels and SciPy"),
     Target("vibrational_kapitza", "vibrational_kapitza", "Kapitza's pendulum: average, threshold, a tilt held in C"),
     Target("vibrational_examples", "vibrational_examples", "cart and two-link arm, actual against averaged, orders"),
+    Target("inverted_body", "inverted_body", "a rigid body upside down on a shaken pivot: threshold against Floquet"),
+    Target(
+        "vehicle_by_three_forces", "vehicle_by_three_forces", "an underwater vehicle steered by three of six forces"
+    ),
+    Target("swimmer_gait", "swimmer_gait", "a three-link swimmer's best gait on its height functions"),
+    Target("falling_cat", "falling_cat", "two bodies on a joint turn over without angular momentum"),
     Target(
         "vibrational_dumbbell", "vibrational_dumbbell", "Sanyal, Figure 3: what reproduces, and the corrected design"
     ),

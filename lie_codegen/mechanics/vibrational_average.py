@@ -14,19 +14,23 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.mechanics.bracket_series import BracketTerm, bracket_series, word_text
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
+from lie_codegen.mechanics.lagrangian_average import LagrangianSeries, series_kernels
 from lie_codegen.mechanics.mechanical_average import MechanicalAverage, mechanical_average
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
 from lie_codegen.mechanics.routh import RouthReduction
 from lie_codegen.mechanics.vector_fields import Field
 from lie_codegen.mechanics.vibrational_fields import VibrationalFields, vibrational_fields
-from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
+from lie_codegen.mechanics.vibrational_kernels import term_kernels, vibrational_kernels
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.values import Value
 
 NAMESPACE = "vibrational"
+#: Coordinates up to which brackets are symbols: beyond, and beyond order 2, they are taken by dual numbers.
+_SYMBOLIC = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,16 +41,48 @@ class VibrationalAverage(Value):
         fields: everything exact: drift, lifts, brackets, products, P.
     """
 
-    fields: VibrationalFields
+    fields: VibrationalFields | LagrangianSeries
 
     @property
     def Z(self) -> list[Field]:
-        """[Z_1, .., Z_order], exact: z' = Z_1 + eps Z_2."""
-        return self.fields.Z
+        """[Z_1, .., Z_order], exact: z' = Z_1 + eps Z_2. Of three coordinates and more symbols take minutes: `term` has the numbers.
+
+        Raises:
+            InputError: an order above 2, which has no symbolic form.
+        """
+        return self._exact.Z
+
+    @cached_property
+    def _exact(self) -> VibrationalFields:
+        return self.fields if isinstance(self.fields, VibrationalFields) else self.fields.exact()
+
+    @property
+    def table(self) -> tuple[BracketTerm, ...]:
+        """(order, bracket, coefficient) of every bracket in Z = sum eps^(q-1) sum coefficient * bracket."""
+        given = self.fields
+        inputs = given.inputs if isinstance(given, VibrationalFields) else given.series.inputs
+        series = bracket_series(inputs, given.order, given.gauge)
+        return tuple(
+            BracketTerm(q, word_text(word, len(inputs)), value)
+            for q, rate in enumerate(series.rates, start=1)
+            for word, value in rate.items()
+        )
+
+    def term(self, q: int, z: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Array:
+        """Z_q(z), (..., 2n); q = 1 .. order.
+
+        Raises:
+            InputError: there is no such order.
+        """
+        if isinstance(q, bool) or not isinstance(q, int) or not 1 <= q <= self.fields.order:
+            raise InputError(f"the terms of this average are those of order 1 to {self.fields.order}, got {q!r}")
+        return broadcast_call(self.library[f"term_{q}"], z, *self._values(parameters))[0]
 
     def kernels(self) -> tuple[Kernel, ...]:
-        """rate, actual, estimate, estimate_first, reconstruct, for lc.build and lc.generate."""
-        return vibrational_kernels(self.fields, NAMESPACE)
+        """rate, actual, estimate, estimate_first, reconstruct and term_1 .., for lc.build and lc.generate."""
+        if isinstance(self.fields, LagrangianSeries):
+            return series_kernels(self.fields, NAMESPACE)
+        return (*vibrational_kernels(self.fields, NAMESPACE), *term_kernels(self.fields, NAMESPACE))
 
     @cached_property
     def library(self) -> Library:
@@ -126,7 +162,7 @@ class VibrationalAverage(Value):
         self, y0: ArrayLike, eps: float, parameters: Mapping[str, ArrayLike] | None = None, tau: float = 0.0
     ) -> Array:
         """The averaged state that belongs to an actual start: y0 itself at tau = 0 in the pull-back gauge."""
-        return self.estimate(y0, tau, eps, parameters, floquet_map=self.fields.order == 2)
+        return self.estimate(y0, tau, eps, parameters, floquet_map=self.fields.order >= 2)
 
     def _call(
         self, name: str, arguments: tuple[Any, ...], eps: ArrayLike, parameters: Mapping[str, ArrayLike] | None
@@ -179,7 +215,7 @@ def vibrational_average(
     Args:
         system: of lc.mechanical_system (on a group, any order up to 5), lc.lagrangian_system or lc.routh_reduce.
         u: lc.PeriodicInput in fast time, one component an input of the system, of zero mean.
-        order: 1 or 2; on a group 1 to 5.
+        order: 1 to 4; on a group 1 to 5.
         gauge: "zero_mean" or "pull_back" (the averaged state equals the actual one at the start of each period).
         mean_to_drift: apply the mean of u as a constant force, not divided by eps.
 
@@ -192,6 +228,9 @@ def vibrational_average(
         raise InputError(f"vibrational_average: u is {type(u).__name__}; make it a PeriodicInput")
     if isinstance(system, MechanicalSystem):
         return mechanical_average(system, u, order, gauge, mean_to_drift=mean_to_drift)
+    inner = system.system if isinstance(system, RouthReduction) else system
+    if isinstance(inner, LagrangianSystem) and (order > 2 or len(inner.coordinates) > _SYMBOLIC):
+        return VibrationalAverage(LagrangianSeries(inner, u, order, gauge, mean_to_drift))
     return VibrationalAverage(vibrational_fields(system, u, order=order, gauge=gauge, mean_to_drift=mean_to_drift))
 
 

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.mechanics.lagrangian_average import LagrangianSeries
 from lie_codegen.mechanics.relative_equilibria import newton, parameter_numbers
 from lie_codegen.mechanics.vibrational_fields import FAST, VibrationalFields
 
@@ -68,7 +69,7 @@ class VibrationalFeedback:
 
 
 def design_feedback(
-    fields: VibrationalFields,
+    fields: VibrationalFields | LagrangianSeries,
     *,
     amplitudes: Sequence[str],
     eps: float,
@@ -96,6 +97,8 @@ def design_feedback(
             amplitude reaches (the direction is named); a primitive without a zero common to all inputs.
         ComputationError: no averaged equilibrium near the guess.
     """
+    if isinstance(fields, LagrangianSeries):
+        fields = fields.exact()
     names = [str(p) for p in fields.parameters]
     unknown = [name for name in amplitudes if name not in names]
     if unknown or not amplitudes:

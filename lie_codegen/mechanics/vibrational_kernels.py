@@ -77,6 +77,23 @@ def vibrational_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kern
     )
 
 
+def term_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kernel, ...]:
+    """term_q(z) = Z_q(z), one kernel an order; parameters that stayed symbols are further inputs."""
+    n = len(fields.state)
+    parameters = tuple(Port(str(p), ()) for p in fields.parameters)
+
+    def kernel(q: int) -> Kernel:
+        def body(ops: Arithmetic, z: Any, *given: Any) -> tuple[Any, ...]:
+            values = dict(zip((*fields.parameters, *fields.state), (*given, *z), strict=True))
+            evaluate = ExpressionEvaluator(ops, values)
+            return ([evaluate(entry) for entry in fields.Z[q - 1]],)
+
+        z = Port("z", (n,), description="averaged state (q, v)")
+        return Kernel(f"term_{q}", namespace, (z, *parameters), (Port("Z", (n,)),), body, f"Z_{q}(z)", SOURCE)
+
+    return tuple(kernel(q) for q in range(1, fields.order + 1))
+
+
 def lagrangian_kernels(system: LagrangianSystem, namespace: str = "lagrangian") -> tuple[Kernel, ...]:
     """rate(y, u, parameters...) -> y' = X(y) + Y_a(q) u^a, and energy(y, parameters...) -> kinetic plus potential."""
     n, m = len(system.state), len(system.inputs)

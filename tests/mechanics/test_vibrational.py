@@ -192,7 +192,7 @@ def test_refusals_say_what_to_do():
     cases = [
         (lambda: vibrational_average(system, periodic("6*cos(t) + 1")), "mean_to_drift=True"),
         (lambda: vibrational_average(system, periodic("cos(t)", "sin(t)")), "2 components and the system 1 inputs"),
-        (lambda: vibrational_average(system, u, order=3), "order 3"),
+        (lambda: vibrational_average(system, u, order=5), "order 5"),
         (lambda: vibrational_average(system, u, gauge="mean"), "gauge 'mean'"),
         (lambda: vibrational_average("kapitza", u), "lagrangian_system"),
         (lambda: vibrational_average(drag, u), "degree 3 in the velocities"),
