@@ -41,6 +41,7 @@ from .averaging import oscillator_areas as oscillator_areas
 from .averaging import oscillator_average as oscillator_average
 from .averaging import phase_average as phase_average
 from .averaging import spectral_drift as spectral_drift
+from .averaging import time_average as time_average
 from .averaging import wheel_input as wheel_input
 
 # control

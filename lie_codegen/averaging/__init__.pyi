@@ -18,6 +18,7 @@ from .order_check import order_check as order_check
 from .phase_system import phase_average as phase_average
 from .shape_connection import connection as connection
 from .shape_examples import example_connection as example_connection
+from .time_system import time_average as time_average
 from .vibration_drift import VibrationLine as VibrationLine
 from .vibration_drift import line_drift as line_drift
 from .vibration_drift import spectral_drift as spectral_drift

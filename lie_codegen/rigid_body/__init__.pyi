@@ -12,8 +12,8 @@ from .euler_solutions import solve_averaged as solve_averaged
 from .euler_variational import euler_perturbation as euler_perturbation
 from .euler_variational import moving_parts as moving_parts
 from .free_rigid_body import free_rigid_body as free_rigid_body
-from .mass_points import inertia_from_masses as inertia_from_masses
 from .free_rotation import free_rotation as free_rotation
+from .mass_points import inertia_from_masses as inertia_from_masses
 from .principal_body import principal_body as principal_body
 from .torques import plates as plates
 from .torques import torque as torque
