@@ -20,7 +20,8 @@ from lie_codegen.control.certificate_constants import Metric, hessian_bound, qua
 from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNumbers, overshoot_of
 from lie_codegen.control.claims import check_constant, is_claimed
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.critical_points import CriticalPoints, comes_home, found_points
+from lie_codegen.control.critical_points import CriticalPoints, found_points
+from lie_codegen.control.descent import comes_home
 from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples

@@ -148,8 +148,10 @@ class PointwiseRate:
         At fixed places it is min over z of z^T Q z/z^T P z, quotients of functions affine in eps, so unimodal: the first half is a plain search.
         """
         high = largest_epsilon(self.b_2, overshoot) * (0.999 if overshoot is None else 1)
-        coarse = [self._least(e, self.search.places) for e in high * np.linspace(0, 1, 21)[1:]]
-        epsilon = float(high * (1 + int(np.argmax(coarse))) / 20)
+        # Far from the origin, as on SE(n) with phi not left-invariant, the best eps is a small part of the largest.
+        grid = high * np.concatenate([np.geomspace(1e-4, 0.04, 8), np.linspace(0.05, 1, 20)])
+        coarse = [self._least(float(e), self.search.places) for e in grid]
+        epsilon = float(grid[int(np.argmax(coarse))])
         tried: dict[float, float] = {}
         for turn in range(_EXCHANGES):
             tried[epsilon] = self.at(epsilon, starts=4 if turn == 0 else 1)

@@ -6,7 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from lie_codegen.control.critical_points import CriticalPoints, check_positive, found_points, place
+from lie_codegen.control.critical_points import CriticalPoints, check_positive, found_points
+from lie_codegen.control.descent import place
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples
 from lie_codegen.errors import InputError

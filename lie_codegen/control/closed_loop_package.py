@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.control.loop_ports import read_law
+from lie_codegen.control.loop_ports import LoopLaw, read_law
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.reference_motion import Reference
 from lie_codegen.control.second_order_step import check_loop, held_force_step
@@ -25,6 +25,18 @@ _SHOWN = 50
 
 
 @dataclass(frozen=True)
+class OwnView:
+    """A state of the law: a vector with a rate, or one that is held and jumps."""
+
+    name: str
+    size: int
+    rate: str
+    is_held: bool
+    is_scalar: bool
+    start: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class LoopView:
     """What closed_loop.c.jinja sees."""
 
@@ -34,7 +46,7 @@ class LoopView:
     plant: str
     energy: str
     outputs: tuple[tuple[str, int], ...]
-    own: tuple[tuple[str, int], ...]
+    own: tuple[OwnView, ...]
     entries: int
     matrix_size: int
     dim: int
@@ -98,7 +110,7 @@ def _view(
     places = tuple(parts * (i * d + j) + part for i, j in varying_entries(group) for part in range(parts))
     eye = np.eye(d, dtype=complex if group.is_complex else float).view(float).ravel()
     names = [port.name for port in law.outputs]
-    energy = next((name for name in ("W", "V") if name in names), names[-1])
+    energy = next((name for name in ("W", "V", "phi") if name in names), "")
     steps = round(duration / step)
     return LoopView(
         namespace=group.name,
@@ -107,7 +119,7 @@ def _view(
         plant="held_force_step",
         energy=energy,
         outputs=tuple((port.name, port.size) for port in law.outputs),
-        own=() if read is None else tuple((each.name, each.port.size) for each in read.states),
+        own=() if read is None else _own(read),
         entries=packed_size(group),
         matrix_size=parts * d * d,
         dim=group.dim,
@@ -118,3 +130,21 @@ def _view(
         steps=steps,
         shown=max(1, steps // _SHOWN),
     )
+
+
+def _own(law: LoopLaw) -> tuple[OwnView, ...]:
+    """The law's states, where they start as the law says.
+
+    Raises:
+        InputError: a state on the group, which closed_loop.c does not move.
+    """
+    made = []
+    for each in law.states:
+        if each.kind == "group":
+            raise InputError(
+                f"closed_loop.c does not move states on a group, as {each.name} of {law.kernel.name} is one"
+            )
+        start = np.broadcast_to(np.asarray(law.start.get(each.name, 0.0), dtype=float).ravel(), (each.port.size,))
+        values = tuple(repr(float(x)) for x in start)
+        made.append(OwnView(each.name, each.port.size, each.rate, each.kind == "held", not each.port.shape, values))
+    return tuple(made)

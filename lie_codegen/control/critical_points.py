@@ -19,14 +19,15 @@ from typing import Any, overload
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.cut_locus import cut_level
+from lie_codegen.control.descent import descend, leads_home, place
 from lie_codegen.control.error_catalogue import as_error
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import ErrorSamples, basis_scales, error_samples, random_elements
+from lie_codegen.control.euler_characteristic import euler_characteristic
 from lie_codegen.errors import InputError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.structure import structure
 from lie_codegen.kernel.saved import Saved
 
 #: Two points are one where no entry differs by more; eigenvalues of H below the second count as zero.
@@ -151,40 +152,6 @@ def _up_to_the_cut(pair: ErrorFunction, samples: ErrorSamples, rng: np.random.Ge
     return CriticalPoints(tuple(points), L, L, "cut", None)
 
 
-def cut_level(samples: ErrorSamples, rng: np.random.Generator, count: int = 3000) -> float:
-    """The least of phi where a turn reaches 180 degrees: on rays exp(s x) just before |Im| of an eigenvalue of s hat(x) is pi.
-
-    Infinite on groups without turns.
-    """
-    group = samples.group
-
-    def level(x: Array) -> Array:
-        turn = np.max(np.abs(np.linalg.eigvals(group.hat(x)).imag), axis=-1)
-        ray = turn > 1e-3 * np.linalg.norm(x / basis_scales(group), axis=-1)
-        s = (np.pi - 1e-9) / np.where(ray, turn, 1)
-        with np.errstate(all="ignore"):
-            phi, _ = samples.first(expm(group.hat(s[:, None] * x)))
-        return np.where(ray & np.isfinite(phi), phi, np.inf)
-
-    x = rng.normal(size=(count, group.dim)) * basis_scales(group)
-    values = level(x)
-    order = np.argsort(values)[:8]
-    if not np.isfinite(values[order[0]]):
-        return float("inf")
-    best, least = x[order], values[order]
-    spread = 0.3
-    while spread > 1e-8:
-        moved = best[:, None] + spread * np.linalg.norm(best, axis=1)[:, None, None] * rng.normal(
-            size=(8, 40, group.dim)
-        ) * basis_scales(group) / np.linalg.norm(basis_scales(group))
-        tried = level(moved.reshape(-1, group.dim)).reshape(8, 40)
-        first = np.argmin(tried, axis=1)
-        better = tried[np.arange(8), first] < least
-        best[better], least[better] = moved[np.arange(8), first][better], tried[np.arange(8), first][better]
-        spread *= 0.75 if not np.any(better) else 0.97
-    return float(np.min(least))
-
-
 def check_positive(pair: ErrorFunction, samples: ErrorSamples, rng: np.random.Generator) -> None:
     """Looks for the least value of phi: at random places, and downhill from the lowest of them.
 
@@ -211,26 +178,6 @@ def check_positive(pair: ErrorFunction, samples: ErrorSamples, rng: np.random.Ge
             f"error function {pair.name} on {pair.group.name} is negative: phi = {value:.6g} at "
             f"{place(pair.group, at)}; an error function is zero at X = X_d and positive elsewhere"
         )
-
-
-def descend(samples: ErrorSamples, E: Array, floor: float = -np.inf, steps: int = 300) -> tuple[Array, Array]:
-    """(N, d, d) places downhill from E, and phi there: steepest descent in the metric of the basis, its step found by trial."""
-    scale = basis_scales(samples.group) ** 2
-    phi, slope = samples.first(E)
-    length = 0.1 / np.maximum(1e-12, np.sqrt(np.einsum("ni,i,ni->n", slope, scale, slope)))
-    for _ in range(steps):
-        step = -length[:, None] * slope * scale
-        moved = samples.moved(E, step)
-        with np.errstate(all="ignore"):
-            new_phi, new_slope = samples.first(moved)
-        gain = np.einsum("ni,ni->n", slope, step)
-        better = np.isfinite(new_phi) & (new_phi <= phi + 0.3 * gain)
-        E = np.where(better[:, None, None], moved, E)
-        phi, slope = np.where(better, new_phi, phi), np.where(better[:, None], new_slope, slope)
-        length = np.where(better, 1.6 * length, length / 2)
-        if np.any(phi < floor) or np.all(np.abs(gain) < 1e-15 * (1 + np.abs(phi))):
-            break
-    return E, phi
 
 
 def _parts(samples: Any) -> tuple[Array, Array, Array]:
@@ -329,69 +276,9 @@ def _bounded_ray(samples: ErrorSamples, rng: np.random.Generator) -> bool:
     return bool(np.any(leaves & (phi[2] <= 1.2 * np.maximum(phi[1], phi[0]))))
 
 
-@lru_cache(maxsize=64)
-def euler_characteristic(group: MatrixGroup) -> int | None:
-    """chi of the group: 0 where it holds a circle, 1 where it is contractible; None where neither is seen.
-
-    A group is homotopic to its maximal compact subgroup. A turning basis element with commensurable frequencies closes to a circle; a linear
-    semisimple group has a compact subgroup of positive dimension; where all hat(x) have real eigenvalues exp is a diffeomorphism.
-    """
-    for matrix in group.basis:
-        values, vectors = np.linalg.eig(matrix)
-        turns = np.abs(values.imag)
-        size = float(np.max(turns))
-        if size > 1e-9 and np.max(np.abs(values.real)) < 1e-9 * size and np.linalg.cond(vectors) < 1e8:
-            ratios = turns[turns > 1e-9 * size] / np.min(turns[turns > 1e-9 * size])
-            if np.max(np.abs(ratios * 12 - np.round(ratios * 12))) < 1e-6:
-                return 0
-    if structure(group).killing.det() != 0:
-        return 0
-    rng = np.random.default_rng(0)
-    generic = np.linalg.eigvals(group.hat(rng.normal(size=(8, group.dim)) * basis_scales(group)))
-    return 1 if np.max(np.abs(generic.imag)) < 1e-3 * (1 + np.max(np.abs(generic.real))) else None
-
-
 def _mountain_pass(samples: ErrorSamples, points: list[CriticalPoint]) -> float:
     """The least value among the points from which a path downhill ends at the reference."""
     for point in points[1:]:
-        if leads_home(samples, point):
+        if leads_home(samples, point.X, point.value, point.index):
             return point.value
     return float("inf")
-
-
-def leads_home(samples: ErrorSamples, point: CriticalPoint) -> bool:
-    """Whether a way downhill from a critical point ends at the reference."""
-    scale = basis_scales(samples.group)
-    here = samples.at(point.X[None])
-    values, vectors = np.linalg.eigh((here.hessian[0] + here.hessian[0].T) / 2 * scale * scale[:, None])
-    if values[0] >= 0 or point.index == 0:
-        return False
-    down = vectors[:, values < -_FLAT * np.max(np.abs(values))] * scale[:, None]
-    rng = np.random.default_rng(0)
-    many = down.T if point.index == 1 else np.vstack([down.T, rng.normal(size=(4, down.shape[1])) @ down.T])
-    starts = samples.moved(np.broadcast_to(point.X, (2 * len(many), *point.X.shape)), 1e-2 * np.vstack([many, -many]))
-    _, phi = descend(samples, starts, steps=600)
-    return bool(np.any(phi < 1e-6 * point.value))
-
-
-def comes_home(samples: ErrorSamples, E: Array) -> bool:
-    """Whether the way downhill from E ends at the reference, so that E lies in its component of every level above phi(E)."""
-    start = float(samples.first(E[None])[0][0])
-    _, phi = descend(samples, E[None], steps=600)
-    return bool(phi[0] < 1e-6 * max(start, 1e-300))
-
-
-def place(group: MatrixGroup, E: Array) -> str:
-    """A configuration in words."""
-    if group.name == "so3" or (
-        (group.degree, group.dim) == (3, 3) and not group.is_complex and np.allclose(E.T @ E, np.eye(3), atol=1e-9)
-    ):
-        angle = np.arccos(np.clip((np.trace(E) - 1) / 2, -1, 1))
-        symmetric = (E + E.T) / 2 - np.cos(angle) * np.eye(3)
-        axis = np.linalg.eigh(symmetric)[1][:, -1] if angle > 1e-6 else np.array([1.0, 0, 0])
-        odd = np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
-        turned = axis @ odd if abs(axis @ odd) > 1e-6 else axis[np.argmax(np.abs(axis))]
-        axis = axis * np.sign(turned)
-        return f"a turn by {np.degrees(angle):.6g} degrees about ({', '.join(f'{a + 0.0:.3g}' for a in np.round(axis, 9))})"
-    rows = "; ".join(" ".join(f"{np.real_if_close(z):.4g}" for z in row) for row in E)
-    return f"X_d^-1 X = [{rows}]"

@@ -154,8 +154,11 @@ class LevelSearch:
             places = self._at(base, ahead)
             phi, _ = self.samples.first(places.X, places.X_d)
             speed = np.sum((places.nu @ self.root) ** 2, axis=1)
-            return np.stack([values(places), phi, speed])
+            return np.stack([values(places), phi, speed, _extent(places.X_d) if roaming else np.zeros(len(phi))])
 
+        # Of orthogonal matrices no entry is above 1, wherever the reference is.
+        turns = np.max(np.abs(self.group.basis + np.conj(np.swapaxes(self.group.basis, 1, 2)))) < 1e-12
+        roaming = self.moving and not bool(turns)
         memory: dict[bytes, Array] = {}
 
         def at(v: Array) -> Array:
@@ -178,6 +181,11 @@ class LevelSearch:
             limits.append(
                 {"type": "ineq", "fun": lambda v: 1 - at(v)[2, 0] / speed, "jac": lambda v: -gradient(v, 2) / speed}
             )
+        reach = max(self.reach, 1.0)
+        if roaming:
+            limits.append(
+                {"type": "ineq", "fun": lambda v: 1 - at(v)[3, 0] / reach, "jac": lambda v: -gradient(v, 3) / reach}
+            )
         with np.errstate(all="ignore"):
             found = minimize(
                 lambda v: at(v)[0, 0],
@@ -189,9 +197,8 @@ class LevelSearch:
                 options={"maxiter": 60, "ftol": 1e-12},
             )
         end = at(np.asarray(found.x))
-        within = (
-            end[1, 0] <= level * (1 + 1e-8) and end[1, 0] > 0.5 * least and end[2, 0] <= speed * (1 + 1e-8) + 1e-300
-        )
+        within = least / 2 < end[1, 0] <= level * (1 + 1e-8) and end[2, 0] <= speed * (1 + 1e-8) + 1e-300
+        within = within and end[3, 0] <= reach * (1 + 1e-8)
         if np.isfinite(end[0, 0]) and within and end[0, 0] < start:
             return float(end[0, 0]), self._at(base, np.asarray(found.x)[None])
         return start, base
@@ -214,3 +221,8 @@ def _within(group: MatrixGroup, count: int, rng: np.random.Generator, reach: flo
             break
         X[far] = random_elements(group, int(np.sum(far)), rng, 3 * shrink)
     return np.where(far[:, None, None], np.eye(group.degree), X)
+
+
+def _extent(X: Array) -> Array:
+    """(N,) largest entry of each and its inverse."""
+    return np.asarray(np.maximum(np.max(np.abs(X), axis=(1, 2)), np.max(np.abs(np.linalg.inv(X)), axis=(1, 2))))

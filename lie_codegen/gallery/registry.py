@@ -57,6 +57,14 @@ TARGETS = (
         "hessian_errors",
         "accuracy near the identity: exp and log with two derivatives, ours and the neighbours'",
     ),
+    Target(
+        "tracking_certificates",
+        "tracking_certificates",
+        "constants, rates and regions promised, beside simulated loops",
+    ),
+    Target(
+        "tracking_global", "tracking_certificates", "the hybrid law from half turns; an observer and its covariance"
+    ),
     Target("attitude_trajectory", "attitude_trajectory", "Geyer, Figure 1: the second-order attitude law"),
     Target("attitude_region", "attitude_region", "10^4 initial states of the satellite law beside the proved region"),
     Target(

@@ -224,7 +224,7 @@ def _check_kinds(definition: Any, path: str) -> None:
     """Every factory that a definition names is one of this package."""
     if isinstance(definition, Mapping):
         kind = definition.get("kind")
-        if "parameters" in definition and not str(kind).startswith("lie_codegen."):
+        if {"kind", "parameters"} <= definition.keys() and not str(kind).startswith("lie_codegen."):
             raise InputError(f"{path} names {kind!r}, which is no value of this package")
         for each in definition.values():
             _check_kinds(each, path)

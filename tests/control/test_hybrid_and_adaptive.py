@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
+from lie_codegen.control.closed_loop_package import generate_closed_loop
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.casadi_arithmetic import function_of
 
@@ -213,3 +217,61 @@ def test_first_order_margins() -> None:
     h = margins.sample_period(delay=3)
     sizes = [np.max(np.abs(np.roots([1, -1, 0, 0, 2 * f * h]))) for f in (0.999, 1.001)]
     assert sizes[0] < 1 < sizes[1]
+
+
+def test_the_hybrid_law_flies_as_c_with_its_state_held(tmp_path: Path) -> None:
+    """closed_loop.c: q is kept between calls, from a half turn home."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    reference = lc.reference("so3", ["0.3*sin(t/5)", "0.2*cos(t/5)", "0.1*t"])
+    folder = generate_closed_loop(
+        "so3",
+        tmp_path / "flight",
+        inertia=INERTIA,
+        law=hybrid(),
+        reference=reference,
+        X0=np.diag([1.0, -1, -1]),
+        duration=40,
+        step=0.02,
+    )
+    command = [
+        compiler,
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-Iinclude",
+        "closed_loop.c",
+        "src/so3.c",
+        "-lm",
+        "-o",
+        "loop",
+    ]
+    subprocess.run(command, cwd=folder, check=True)
+    done = subprocess.run(["./loop"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert float(done.stdout.splitlines()[-1].split()[2]) < 1e-3
+
+
+def test_the_loop_holds_states_of_every_kind() -> None:
+    """q held, a integrated, X_hat on the group: the published offset, and adaptation from where the law starts."""
+    t = np.linspace(0, 30, 4)
+    still = lc.reference("so3", ["0", "0", "0"])
+    run = lc.closed_loop(
+        "so3", law=hybrid(), inertia=INERTIA, reference=still, X0=np.diag([1.0, -1, -1]), t=t, sample=0.02, step=0.02
+    )
+    assert run.error[-1] < 1e-4
+    assert set(run.states["q"].ravel()) == {1.0}
+    moving = lc.reference("so3", ["0.3*sin(t)", "0.2*cos(t)", "0.1*t"])
+    learning = lc.closed_loop("so3", law=adaptive(), inertia=INERTIA, reference=moving, t=t, step=0.02)
+    assert learning.states["a"][0] == pytest.approx([1, 1, 1, 0, 0, 0])
+    assert learning.outputs["phi"][-1] < learning.outputs["phi"][0] / 10
+    law = lc.output_feedback_law("so3", directions=[[0, 0, 1]], target_directions=[[0, 0.6, 0.8]], r=3, g=4, G=1.5)
+    X = expm(SO3.hat([0.9, 0, 0]))
+    far = lc.closed_loop(
+        "so3", law=law, inertia=INERTIA, X0=X, xi0=[0.3, 1.1, 1.6], t=[0, 100, 200], states={"X_hat": X}, step=0.02
+    )
+    y = far.X[-1].T[:, 2]
+    assert np.arccos(y @ [0, 0.6, 0.8]) == pytest.approx(0.3585656, abs=1e-5)
+    assert np.linalg.norm(far.xi[-1]) == pytest.approx(1.6802515, abs=1e-5)

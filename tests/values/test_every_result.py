@@ -50,6 +50,11 @@ def propagator() -> Any:
     return lc.propagator("so3", u, duration="period")
 
 
+def certificate() -> Any:
+    gains = {"K_p": [4, 5, 6], "K_d": 5}
+    return lc.certificate("so3", inertia=[1, 2, 3], error="so3_right", gains=gains, level=4, epsilon=0.1, prove=False)
+
+
 SAVED: dict[str, Callable[[], Any]] = {
     "formulas": circles,
     "parameters": lambda: lc.PeriodicInput(["a*sin(t)", "cos(t)", "0"], parameters=["a"]),
@@ -75,12 +80,22 @@ SAVED: dict[str, Callable[[], Any]] = {
     "order": lambda: lc.order_check(lc.group("so3"), circles(), 2, eps=(0.2, 0.1)),
     "reference": lambda: lc.reference(lc.group("so3"), ["0.3*sin(t)", "0", "t"]),
     "loop": loop,
+    "certificate": certificate,
+    "critical points": lambda: lc.critical_points("so3_right", group="so3", gains={"K_p": [4, 5, 6]}),
+    "margins": lambda: lc.loop_margins(inertia=[1, 2, 3], stiffness=4, damping=5),
+    "first-order margins": lambda: lc.loop_margins(rate=2),
+    "masses": lambda: lc.inertia_from_masses([1, 2, 3], [[0, 0, 0], [1, 0, 0], [0, 2, 1]]),
+    "manifold": lambda: lc.manifold(3, constraints=["q1^2 + q2^2 + q3^2 - 1"], inertia=["2", "2 + q1^2", "3"]),
 }
 OTHERS: dict[str, Callable[[], Any]] = {
     "body": lambda: lc.free_rigid_body([1, 2, 3]),
     "euler": lambda: lc.euler_average(lc.free_rigid_body([1, 2, 3]), ["-w1", "-w2", "-w3"]),
     "vibration": vibration,
     "law": lambda: lc.attitude_law(),
+    "hybrid law": lambda: lc.hybrid_law("so3", inertia=[1, 2, 3], K_p=[4, 5, 6], K_d=2),
+    "observer": lambda: lc.observer("so3", directions=[[0, 0, 1], [0.6, 0, 0.8]], k_p=1.2, k_i=0.3),
+    "output feedback": lambda: lc.output_feedback_law("so3", directions=[[0, 0, 1]], target_directions=[[0, 0.6, 0.8]]),
+    "adaptive law": lambda: lc.adaptive_law("so3", error="so3_right", gains={"K_p": 4, "K_d": 5}, rate=2),
     "library": lambda: lc.build("so3"),
     "library of a law": lambda: lc.build(lc.attitude_law()),
     "kernel": lambda: lc.build("so3").exp,
