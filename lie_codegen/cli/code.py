@@ -32,6 +32,7 @@ def generate(
         ),
     ] = None,
     name: Annotated[str | None, typer.Option(help="C identifier of the header, the source and the target.")] = None,
+    target: Annotated[str, typer.Option(help="c, fmu, rust, wasm or ros2: what surrounds the C.")] = "c",
     json: Json = False,
 ) -> None:
     """Generate the C package of a group, of its laws and plans: header, source, CMake, example, test vectors."""
@@ -48,7 +49,9 @@ def generate(
     if plan is not None:
         parts.append(_plan_of(plan, g))
     controls = None if steering is None else [label.strip() for label in steering.split(",")]
-    folder = write(parts if len(parts) > 1 else g, out or Path(g.name), real=real, steering=controls, name=name)
+    folder = write(
+        parts if len(parts) > 1 else g, out or Path(g.name), real=real, steering=controls, name=name, target=target
+    )
     seconds = time.perf_counter() - started
     files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
     text = f"wrote {folder} in {seconds:.2f} s: {', '.join(files)}"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.package import render_package
+from lie_codegen.codegen.targets import with_target
 from lie_codegen.codegen.views import PackageMetadata
 from lie_codegen.codegen.write import write_package
 from lie_codegen.kernel.kernel import Kernel
@@ -20,6 +21,7 @@ def generate(
     metadata: PackageMetadata | Mapping[str, Any] | None = None,
     extra: Mapping[str, str] | None = None,
     real: str = "double",
+    target: str = "c",
 ) -> Path:
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
@@ -30,13 +32,15 @@ def generate(
         metadata: what the documentation says about the group: `PackageMetadata` or a mapping of its fields.
         extra: further files of the package, {path: text}.
         real: "double", or "float" for processors that have no double; the formulas are the same.
+        target: what surrounds the C, see `lie_codegen.codegen.targets`.
 
     Raises:
         CodegenError: a kernel cannot become C, two symbols collide, or a constant is beyond the range of float.
         IdentifierError: the namespace is no C identifier.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    return write_package(render_package(namespace, kernels, _metadata(metadata), extra, real), folder)
+    tree = render_package(namespace, kernels, _metadata(metadata), extra, real)
+    return write_package(with_target(tree, target, real), folder)
 
 
 def _metadata(given: PackageMetadata | Mapping[str, Any] | None) -> PackageMetadata:

@@ -11,6 +11,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.group_library import GroupLibrary, group_library
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.runtime.build import build_kernels, defined_together
+from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.runtime.current_package import current_package, package_key, remember_package
 from lie_codegen.runtime.library import Library, require_kernels
 
@@ -85,6 +86,7 @@ def generate(
     real: str = "double",
     name: str | None = None,
     form: str | None = None,
+    target: str = "c",
 ) -> Path:
     """The C package of a group, of kernels, of a plan, of a closed loop or of a controller of `lc.mpc`, or of several of these;
     written as a folder; returns its path.
@@ -101,31 +103,39 @@ def generate(
         real: "double", or "float" for processors without double: arguments, constants and libm in single precision.
         name: C identifier of the header, the source and the CMake target; the namespaces if None. So two laws of one group,
             with names of their own, and the group's own package go into one program.
+        target: "c"; or what surrounds the same C: "fmu" (a unit of FMI 3.0 for co-simulation, <name>.fmu in the folder; steps keep their
+            state, inputs that are gains or inertias are tunable parameters), "rust" (a no_std crate; `cargo test` runs the vectors), "wasm" (an
+            ES module with types; needs ziglang), "ros2" (a package.xml for a workspace).
         form: of a plan's controls: "table" (polynomials, piece by piece), "fourier", or the shorter of the two if None.
 
     What the folder holds is compared with what was last written there from the same definition: if it is current, nothing
     is derived or written.
 
     Raises:
-        InputError: as `build`; steering without a group; a form that the plan has not.
+        InputError: as `build`; steering without a group; a form that the plan has not; a target that there is not.
+        MissingDependencyError: wasm without ziglang. CompileError: of fmu and wasm, with the compiler's own words.
         UncontrollableError: the controls of `steering` do not reach everything; says what is missing.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
     from lie_codegen.codegen.generate import generate as generate_package
+    from lie_codegen.codegen.targets import check_target, pack_fmu
     from lie_codegen.codegen.write import write_package
 
+    check_target(target, real)
     render = getattr(what, "render_package", None)
     if callable(render):
         # a controller of a floor above this one says itself what it is as C
         if steering is not None:
             raise InputError("generate: steering needs a group, not a controller")
+        if target != "c":
+            raise InputError(f"generate: a controller is written as C, not for {target}")
         return write_package(render(real=real), folder)
     parted, plain = _split(what)
     if form is not None and not parted:
         raise InputError("generate: form says how the controls of a plan are stored, and no plan is given")
     source = None if parted else _known_by(plain)
     controls = list(steering) if isinstance(steering, Sequence) and not isinstance(steering, str) else steering
-    key = None if source is None else package_key([source, controls, real, name])
+    key = None if source is None else package_key([source, controls, real, name, target])
     if (current := current_package(key, folder)) is not None:
         return current
     groups, kernels, parts = _gathered(plain, parted, name, real, form)
@@ -136,7 +146,11 @@ def generate(
     alone = groups[0] if len(groups) == 1 and all(kernel.namespace == groups[0].name for kernel in kernels) else None
     namespace = parts[0].namespace if parts and name is None else _package_name(kernels, name)
     metadata = None if alone is None else _metadata(alone)
-    written = generate_package(kernels, folder, namespace=namespace, metadata=metadata, extra=extra, real=real)
+    written = generate_package(
+        kernels, folder, namespace=namespace, metadata=metadata, extra=extra, real=real, target=target
+    )
+    if target == "fmu":
+        pack_fmu(written, [each.command for each in find_compilers()])
     remember_package(key, written)
     return written
 

@@ -1,0 +1,170 @@
+"""The same C for other worlds: each target runs the package's own vectors, or drives the unit step by step."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lie_codegen as lc
+
+COMPILER = shutil.which("cc")
+
+
+def run(command: list[str], folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=500, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def law() -> lc.Kernel:
+    return lc.attitude_law("pd", tunable=True)
+
+
+@pytest.mark.parametrize("target", ["rust", "ros2", "fmu"])
+def test_the_c_is_the_same_and_a_second_call_writes_nothing(law: lc.Kernel, tmp_path: Path, target: str) -> None:
+    plain, other = lc.generate(law, tmp_path / "c"), lc.generate(law, tmp_path / target, target=target)
+    for path in ("src/so3.c", "include/so3.h", "CMakeLists.txt", "test_vectors.csv"):
+        assert (plain / path).read_bytes() == (other / path).read_bytes()
+    stamp = (other / "manifest.json").stat().st_mtime_ns
+    assert lc.generate(law, tmp_path / target, target=target) == other
+    assert (other / "manifest.json").stat().st_mtime_ns == stamp
+    # another target in its place: the folder is ours, and is replaced
+    lc.generate(law, tmp_path / target)
+    assert not list((tmp_path / target).glob("*.fmu"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cargo") is None, reason="no cargo")
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_a_crate_runs_its_vectors(law: lc.Kernel, tmp_path: Path, real: str) -> None:
+    for what, name in ((law, "law"), ("so3", "so3")):
+        folder = lc.generate(what, tmp_path / name, target="rust", real=real)
+        said = run(["cargo", "test", "--offline", "--test", "vectors"], folder)
+        assert re.search(r"test result: ok\. [1-9]", said)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None or shutil.which("node") is None, reason="no ziglang or node"
+)
+def test_a_module_runs_its_vectors(law: lc.Kernel, tmp_path: Path) -> None:
+    for what, name in ((law, "law"), ("su2", "su2")):
+        folder = lc.generate(what, tmp_path / name, target="wasm")
+        assert "vectors, largest error" in run(["node", "example.mjs"], folder)
+        assert "export function" in next(folder.glob("*.d.ts")).read_text()
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
+def test_a_package_of_a_workspace(law: lc.Kernel, tmp_path: Path) -> None:
+    folder = lc.generate(law, tmp_path / "ros", target="ros2")
+    root = ElementTree.parse(folder / "package.xml").getroot()
+    assert root.findtext("export/build_type") == "cmake"
+    run(["cmake", "-S", ".", "-B", "../build", "-DCMAKE_INSTALL_PREFIX=../install"], folder)
+    run(["cmake", "--build", "../build", "--target", "install"], folder)
+    assert list((tmp_path / "install").rglob("so3.h"))
+
+
+class Unit:
+    """A unit of FMI 3.0 by ctypes alone, as any simulator would load it."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        zipfile.ZipFile(path).extractall(folder)
+        root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+        self.variables = {each.attrib["name"]: each for each in root.iter("Float64")}
+        library = ctypes.CDLL(str(next((folder / "binaries").rglob("*.so"))))
+        make = library.fmi3InstantiateCoSimulation
+        make.restype = ctypes.c_void_p
+        assert make(b"u", b"{wrong}", None, 0, 0, 0, 0, None, ctypes.c_size_t(0), None, None, None) is None
+        token = root.attrib["instantiationToken"].encode()
+        self.unit = ctypes.c_void_p(make(b"u", token, None, 0, 0, 0, 0, None, ctypes.c_size_t(0), None, None, None))
+        assert self.unit.value
+        self.library = library
+        zero = ctypes.c_double(0)
+        assert library.fmi3EnterInitializationMode(self.unit, 0, zero, zero, 0, zero) == 0
+        assert library.fmi3ExitInitializationMode(self.unit) == 0
+
+    def _place(self, name: str) -> tuple[Any, int]:
+        each = self.variables[name]
+        size = int(np.prod([int(d.attrib["start"]) for d in each.iter("Dimension")]))
+        return (ctypes.c_uint32 * 1)(int(each.attrib["valueReference"])), size
+
+    def get(self, name: str) -> np.ndarray:
+        reference, size = self._place(name)
+        values = (ctypes.c_double * size)()
+        assert self.library.fmi3GetFloat64(self.unit, reference, ctypes.c_size_t(1), values, ctypes.c_size_t(size)) == 0
+        return np.array(values)
+
+    def set(self, name: str, given: Any) -> int:
+        reference, size = self._place(name)
+        values = (ctypes.c_double * size)(*np.ravel(given))
+        return int(self.library.fmi3SetFloat64(self.unit, reference, ctypes.c_size_t(1), values, ctypes.c_size_t(size)))
+
+    def step(self, t: float, h: float) -> None:
+        flags, last = [(ctypes.c_int * 1)() for _ in range(3)], (ctypes.c_double * 1)()
+        assert self.library.fmi3DoStep(self.unit, ctypes.c_double(t), ctypes.c_double(h), 0, *flags, last) == 0
+        assert last[0] == t + h
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no compiler")
+def test_a_law_as_a_unit(law: lc.Kernel, tmp_path: Path) -> None:
+    folder = lc.generate(law, tmp_path / "law", target="fmu")
+    unit = Unit(folder / "so3.fmu", tmp_path / "unit")
+    assert unit.variables["k_p"].attrib["causality"] == "parameter"
+    assert unit.variables["k_p"].attrib["variability"] == "tunable"
+    assert unit.variables["inertia"].attrib["variability"] == "tunable"
+    lib = lc.build(law)
+    X, w, inertia = lc.build("so3").exp([0.5, -0.2, 0.3]), np.array([0.1, 0.2, -0.4]), np.diag([1.0, 2.0, 3.0])
+    for name, value in (("X", X), ("omega", w), ("inertia", inertia), ("k_p", 4.0), ("k_d", 3.0)):
+        assert unit.set(name, value) == 0
+    expected = lib.attitude_pd(X, w, inertia, 4.0, 3.0)
+    assert np.array_equal(unit.get("torque"), expected.torque)
+    assert unit.set("k_p", 5.0) == 0
+    assert np.array_equal(unit.get("torque"), lib.attitude_pd(X, w, inertia, 5.0, 3.0).torque)
+    assert unit.set("torque", [1, 2, 3]) != 0  # an output cannot be set
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no compiler")
+def test_a_closed_loop_as_a_unit(tmp_path: Path) -> None:
+    law = lc.attitude_law("pd", inertia=[1, 2, 3], k_p=4, k_d=6)
+    start = lc.build("so3").exp([1, 0.5, 0.2])
+    loop = lc.closed_loop(
+        "so3", law=law, inertia=[1, 2, 3], X0=start, xi0=[0.1, 0, 0.2], t=np.linspace(0, 2, 11), step=0.05
+    )
+    folder = lc.generate(loop, tmp_path / "loop", target="fmu")
+    unit = Unit(folder / "so3.fmu", tmp_path / "unit")
+    assert unit.set("state", [*start.ravel(), 0.1, 0, 0.2]) == 0
+    for k in range(40):
+        unit.step(0.05 * k, 0.05)
+    assert np.max(np.abs(unit.get("state") - [*loop.X[-1].ravel(), *loop.xi[-1]])) < 1e-13
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no compiler")
+def test_a_unit_is_valid_and_runs_in_a_simulator(law: lc.Kernel, tmp_path: Path) -> None:
+    validation = pytest.importorskip("fmpy.validation")
+    import fmpy
+
+    unit = str(lc.generate(law, tmp_path / "law", target="fmu") / "so3.fmu")
+    assert validation.validate_fmu(unit) == []
+    run = fmpy.simulate_fmu(unit, stop_time=1.0, output_interval=0.5, start_values={"k_p": 2.0})
+    assert len(run) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({"target": "ada"}, "target is one of"), ({"target": "fmu", "real": "float"}, "takes doubles")],
+)
+def test_what_is_refused(law: lc.Kernel, tmp_path: Path, options: dict[str, Any], said: str) -> None:
+    with pytest.raises(lc.errors.InputError, match=said):
+        lc.generate(law, tmp_path / "no", **options)
+    assert not (tmp_path / "no").exists()
