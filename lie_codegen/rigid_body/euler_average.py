@@ -29,6 +29,7 @@ from lie_codegen.rigid_body.euler_second_order import (
 )
 from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_perturbation
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, SlowState, check_slow
+from lie_codegen.rigid_body.phase_as_time import cycle_growth, phase_time_kernels, third_order_motion
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
@@ -98,6 +99,18 @@ class EulerAverage(Value):
         """Compiled: terms, near_identity, mean_rate and actual_rate, loops over phases."""
         return build(second_order_kernels(self.perturbation, NAMESPACE))
 
+    @cached_property
+    def third_order_library(self) -> Library:
+        """Compiled: terms, near_identity, mean_rate and actual_rate of (Omega, k, s) with the phase as time, to order 3."""
+        return build(phase_time_kernels(self.perturbation, NAMESPACE))
+
+    def cycle_growth(self, k: float) -> tuple[float, float]:
+        """(c3, dk) of a limit cycle k of linear g: Omega' = c3 eps^3 / Omega [rad/s], the cycle moving by dk eps^2 / Omega^2.
+
+        The reversing symmetry leaves no term of order eps^2; forgetting that the cycle itself moves gives another c3.
+        """
+        return cycle_growth(self.third_order_library, k)
+
     def second_order(self, Omega: ArrayLike, k: ArrayLike, tau: ArrayLike = 0.0) -> SecondOrder:
         """(F2_Omega, F2_k, G2): mean Omega' = eps F1 + eps^2 F2, phi' = Lambda + eps G1 + eps^2 G2; arguments broadcast.
 
@@ -162,15 +175,15 @@ class EulerAverage(Value):
                 axes and signs that it needs.
             t: (N,) [s], increasing; the first is the start.
             eps: the small number.
-            order: 1 or 2.
+            order: 1, 2, or 3 (the phase as time: slow variables to O(eps^3), t and phi one order lower).
             start: "mean" starts at the mean point that belongs to omega0; "osculating" at omega0 itself, as the paper does.
             rtol: of the integration of the averaged system.
 
         Raises:
             InputError: another order or start; omega0 at rest or on the separatrix.
         """
-        if order not in (1, 2) or start not in ("mean", "osculating"):
-            raise InputError(f"order is 1 or 2 and start 'mean' or 'osculating', given {order!r}, {start!r}")
+        if order not in (1, 2, 3) or start not in ("mean", "osculating"):
+            raise InputError(f"order is 1, 2 or 3 and start 'mean' or 'osculating', given {order!r}, {start!r}")
         vector, times = np.asarray(omega0, dtype=float), np.atleast_1d(np.asarray(t, dtype=float))
         if vector.ndim == 2:
             return [self._solve(each, times, eps, order, start, rtol) for each in vector]
@@ -186,6 +199,8 @@ class EulerAverage(Value):
         if len(t) == 1:
             t = np.array([0.0, t[0]])
         first, tau = body.to_slow(omega0, eps * t[0]), eps * float(t[0])
+        if order == 3:
+            return self._third(body, first, tau, t, eps, rtol)
         mean, status = first, GOOD
         if start == "mean":
             mean, status = self._to_mean(float(first.Omega), float(first.k), float(first.phi), eps, tau)
@@ -205,6 +220,18 @@ class EulerAverage(Value):
         found = self.to_osculating(means.Omega, means.k, means.phi, eps, eps * kept)
         omega = body.from_slow(found.Omega, np.clip(found.k, 0, LARGEST_MODULUS), found.phi, eps * kept)
         return EulerSolution(kept, *found, omega, means, status, float(motion.t[-1]), order)
+
+    def _third(
+        self, body: FreeRigidBody, first: SlowState, tau: float, t: Array, eps: float, rtol: float
+    ) -> EulerSolution:
+        x0 = np.array([float(first.Omega), float(first.k), tau])
+        rate = float(body.frequency(first.Omega, first.k, tau))
+        kept, mean, full, status, end = third_order_motion(
+            self.third_order_library, x0, float(first.phi), rate, t, eps, rtol
+        )
+        omega = body.from_slow(full[:, 0], full[:, 1], full[:, 3], eps * kept)
+        means = MeanMotion(mean[:, 0], mean[:, 1], mean[:, 3])
+        return EulerSolution(kept, full[:, 0], full[:, 1], full[:, 3], omega, means, status, end, 3)
 
     @property
     def is_closed(self) -> bool:

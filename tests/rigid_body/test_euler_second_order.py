@@ -70,6 +70,29 @@ def test_figure_3d_rises(figure):
     np.testing.assert_allclose(mean, [1.07774, 0.55010, -0.10872], atol=5e-6)
 
 
+def test_third_order_with_the_phase_as_time(figure):
+    """The published run, c3 and the shift of the cycle; then the growth rate of the true system."""
+    run = figure.solve((0.5, 0.5, 1), [0, 200], 0.1, order=3)
+    assert run.status == "ok"
+    assert run.mean.Omega[-1] == pytest.approx(1.3352, abs=5e-5)
+    assert run.Omega[-1] == pytest.approx(1.3329, abs=5e-5)
+    (cycle,) = lc.limit_cycles(figure)
+    c3, dk = figure.cycle_growth(cycle.k)
+    assert c3 == pytest.approx(0.738374562, abs=2e-8)
+    assert dk == pytest.approx(-0.8747, abs=5e-5)
+
+
+def test_third_order_beats_the_second(flow):
+    errors = {2: [], 3: []}
+    for eps in (0.02, 0.01):
+        t = np.linspace(0, 1 / eps, 41)
+        true = flow.body.to_slow(actual((0.5, 0.5, 1), t, eps))
+        for order, rows in errors.items():
+            run = flow.solve((0.5, 0.5, 1), t, eps, order=order)
+            rows.append(max(np.abs(true.Omega - run.Omega).max(), np.abs(true.k - run.k).max()))
+    assert errors[3][1] < errors[2][1] / 3
+
+
 def test_slopes_to_the_smallest_eps(flow):
     rows = []
     for eps in (0.01, 0.005, 0.0025):
@@ -143,7 +166,7 @@ def test_c_and_its_twin_and_the_package(flow, tmp_path):
 
 
 def test_refusals(flow):
-    with pytest.raises(InputError, match="order is 1 or 2"):
+    with pytest.raises(InputError, match="order is 1, 2 or 3"):
         flow.solve((0.5, 0.5, 1), [0, 1], 0.01, order=5)
     with pytest.raises(InputError, match="increasing"):
         flow.solve((0.5, 0.5, 1), [1, 0], 0.01)
