@@ -134,7 +134,7 @@ PLAUSIBLE: dict[str, Callable[[], Any]] = {
     "x": lambda: [0.1, 0.2, 0.3],
     "y": lambda: [0.1, 0.2, 0.3],
     "gains": lambda: {"K_p": [1, 1, 1], "K_d": 1},
-    "error": lambda: lc.error_function("so3", "so3_right"),
+    "error": lambda: "so3_right",
     "law": _law,
     "system": _cart,
     "flow": _flow,
@@ -175,7 +175,7 @@ PLAUSIBLE: dict[str, Callable[[], Any]] = {
     "omega": lambda: 1.0,
     "steps": lambda: 3,
     "parameters": lambda: None,
-    "problem": lambda: lc.ocp("so3", duration=1.0, intervals=4, target=np.eye(3)),
+    "problem": lambda: lc.ocp("so3", duration=1.0, intervals=4),
 }
 #: Files, pictures and whole pipelines have tests of their own; these names are records of results.
 LEFT_OUT = {

@@ -1,0 +1,90 @@
+"""The hunt: `python -m tests.hunt [--scale N] [--write]` tries to break what SECURITY.md promises, prints a table, and with --write puts it there.
+
+A scale of 1 takes some minutes, 10 is the slow job (under two hours on two cores). The status is 1 if anything was found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.hunt import faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
+
+PAGE = Path(__file__).resolve().parents[2] / "SECURITY.md"
+BEGIN, END = "<!-- hunt: begin -->", "<!-- hunt: end -->"
+Part = Callable[[], tuple[int, list[str]]]
+
+
+def parts(scale: int, home: Path) -> dict[str, Part]:
+    """What is hunted: (what, unit) -> the hunt."""
+    found: dict[str, Part] = {
+        "calls of the front door with one hostile argument": lambda: hostile.hunt(min(1.0, 0.03 * scale))
+    }
+    for kind in texts.KINDS:
+        found[f"{kind} by Hypothesis, after the corpus"] = lambda kind=kind: texts.hunt(kind, 100 * scale)
+    found["targets and states off the group"] = lambda: off_manifold.hunt(8 * scale)
+    if generated_c.has_sanitizers(home / "probe"):
+        for group in ("so3", "se3", "su2"):
+            for lanes in (False, True):
+                found[
+                    f"samples of every kernel of {group}, {'lanes' if lanes else 'one lane'}, under ASan and UBSan"
+                ] = lambda group=group, lanes=lanes: generated_c.hunt(
+                    home / f"{group}{lanes}", group, 10 * scale, lanes=lanes
+                )
+        found["calls of the C steering solver with unusable arguments, under ASan and UBSan"] = lambda: (
+            solver_arguments.hunt(home / "solver")
+        )
+    found["faults injected: n-th write, rename, fork, lock refused, full or killed"] = lambda: faults.hunt(12 * scale)
+    found["kills among eight processes on one cache with tiny limits"] = lambda: faults.kills(20 * scale)
+    found["planted and tampered files of the cache"] = lambda: faults.planted(home / "planted")
+    found["strict compilations: compilers, float, one lane, foreign targets"] = lambda: warnings_matrix.hunt(
+        home / "matrix"
+    )
+    return found
+
+
+def table(rows: list[tuple[str, int, int, float]]) -> str:
+    """The figures as Markdown."""
+    lines = ["| hunted | tried | found | seconds |", "|---|---|---|---|"]
+    lines += [f"| {what} | {tried:,} | {found} | {seconds:.0f} |" for what, tried, found, seconds in rows]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Hunt, print, and write if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scale", type=int, default=1)
+    parser.add_argument("--only", default="", help="parts whose name holds this")
+    parser.add_argument("--write", action="store_true", help="put the table into SECURITY.md")
+    asked = parser.parse_args()
+    texts.limit_memory()
+    rows, finds = [], []
+    with tempfile.TemporaryDirectory(prefix="hunt-") as folder:
+        for what, part in parts(asked.scale, Path(folder)).items():
+            if asked.only in what:
+                began = time.perf_counter()
+                tried, found = part()
+                rows.append((what, tried, len(found), time.perf_counter() - began))
+                finds += found
+                print(f"{what}: {tried:,} tried, {len(found)} found", flush=True)  # noqa: T201
+    text = table(rows)
+    print(text, *finds, sep="\n")  # noqa: T201
+    if asked.write:
+        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+        tail = rest.partition(END)[2]
+        commit = subprocess.run(
+            ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+        ).stdout.strip()
+        about = f"Scale {asked.scale}, commit {commit or 'unknown'}, Python {platform.python_version()}, {platform.system()} {platform.machine()}."
+        PAGE.write_text(f"{head}{BEGIN}\n{about}\n\n{text}\n{END}{tail}", encoding="utf-8")
+    return 1 if finds else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

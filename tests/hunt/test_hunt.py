@@ -1,0 +1,94 @@
+"""The hunt in small, on every run; `python -m tests.hunt` is the large one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.hunt import __main__ as whole
+from tests.hunt import faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
+
+SECURITY = Path(__file__).resolve().parents[2] / "SECURITY.md"
+
+
+def test_only_errors_of_ours_leave_the_front_door() -> None:
+    tried, found = hostile.hunt(0.01, seed=1)
+    assert tried > 100
+    assert not found, "\n".join(found)
+
+
+def test_the_guard_can_be_seen_to_work() -> None:
+    """A judge that finds nothing would find nothing in anything."""
+    assert "ZeroDivisionError" in str(hostile.judged(1.0, lambda: 1 / 0))
+    assert "LateError" in str(hostile.judged(0.05, lambda: [None for _ in iter(int, 1)]))
+    assert off_manifold.look_at_law(1e-3, off_manifold.np.eye(3) * 1.001, _wrong_law, ()) is not None
+
+
+class _WrongLaw:
+    name = "wrong"
+
+    def __call__(self, X: object) -> tuple[object, ...]:
+        return (float(X[0][0] == 1.0),)  # type: ignore[index]
+
+
+_wrong_law = _WrongLaw()
+
+
+@pytest.mark.parametrize("kind", texts.KINDS)
+def test_texts_are_refused_or_read(kind: str) -> None:
+    tried, found = texts.hunt(kind, 8 if kind == "command lines" else 25)
+    assert tried >= len(texts.corpus(kind))
+    assert not found, "\n".join(found)
+
+
+def test_off_the_group_it_is_refused_projected_or_right() -> None:
+    tried, found = off_manifold.hunt(4, methods=("optimal", "circle"))
+    assert tried == 24
+    assert not found, "\n".join(found)
+
+
+def test_the_c_solver_refuses_what_is_no_number(tmp_path: Path) -> None:
+    if solver_arguments.COMPILER is None:
+        pytest.skip("no C compiler")
+    tried, found = solver_arguments.hunt(tmp_path, sanitize=generated_c.has_sanitizers(tmp_path / "probe"))
+    assert tried > 50
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("lanes", [False, True], ids=["one lane", "lanes"])
+def test_generated_c_survives_any_number(lanes: bool, tmp_path: Path) -> None:
+    if not generated_c.has_sanitizers(tmp_path / "probe"):
+        pytest.skip("no sanitizers")
+    tried, found = generated_c.hunt(tmp_path / "c", "so2" if lanes else "se2", 2, lanes=lanes)
+    assert tried > 300
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.skipif(solver_arguments.COMPILER is None, reason="no C compiler")
+def test_after_a_fault_all_is_as_fast_as_ever() -> None:
+    _, found = faults.hunt(2, seed=3)
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.skipif(not warnings_matrix.compilers(), reason="neither gcc nor clang")
+def test_generated_c_has_no_warning_to_give(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(warnings_matrix, "has_zig", lambda: False)
+    tried, found = warnings_matrix.hunt(tmp_path)
+    assert tried >= 6
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.slow
+def test_kills_and_planted_files(tmp_path: Path) -> None:
+    for tried, found in (faults.kills(40), faults.planted(tmp_path), faults.hunt(40)):
+        assert tried
+        assert not found, "\n".join(found)
+
+
+def test_the_page_has_the_figures_of_the_last_hunt() -> None:
+    text = SECURITY.read_text(encoding="utf-8")
+    figures = text.partition(whole.BEGIN)[2].partition(whole.END)[0]
+    rows = [line for line in figures.splitlines() if line.startswith("| ") and not line.startswith("| hunted")]
+    assert len(rows) >= 10
+    assert all(int(row.split("|")[2].replace(",", "")) > 0 for row in rows)
