@@ -23,9 +23,7 @@ Part = Callable[[], tuple[int, list[str]]]
 
 def parts(scale: int, home: Path) -> dict[str, Part]:
     """What is hunted: (what, unit) -> the hunt."""
-    found: dict[str, Part] = {
-        "calls of the front door with one hostile argument": lambda: hostile.hunt(min(1.0, 0.03 * scale))
-    }
+    found: dict[str, Part] = {"calls of the front door with one hostile argument": lambda: _calls(scale)}
     for kind in texts.KINDS:
         found[f"{kind} by Hypothesis, after the corpus"] = lambda kind=kind: texts.hunt(kind, 100 * scale)
     found["targets and states off the group"] = lambda: off_manifold.hunt(8 * scale)
@@ -49,6 +47,11 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
     return found
 
 
+def _calls(scale: int) -> tuple[int, list[str]]:
+    with texts.limited_memory():
+        return hostile.hunt(min(1.0, 0.03 * scale))
+
+
 def table(rows: list[tuple[str, int, int, float]]) -> str:
     """The figures as Markdown."""
     lines = ["| hunted | tried | found | seconds |", "|---|---|---|---|"]
@@ -63,7 +66,6 @@ def main() -> int:
     parser.add_argument("--only", default="", help="parts whose name holds this")
     parser.add_argument("--write", action="store_true", help="put the table into SECURITY.md")
     asked = parser.parse_args()
-    texts.limit_memory()
     rows, finds = [], []
     with tempfile.TemporaryDirectory(prefix="hunt-") as folder:
         for what, part in parts(asked.scale, Path(folder)).items():

@@ -175,7 +175,7 @@ PLAUSIBLE: dict[str, Callable[[], Any]] = {
     "omega": lambda: 1.0,
     "steps": lambda: 3,
     "parameters": lambda: None,
-    "problem": lambda: lc.ocp("so3", duration=1.0, intervals=4),
+    "problem": lambda: lc.ocp("so3", duration=1.0, intervals=4, controls=["w1", "w2"], bounds={"u": 1.0}),
 }
 #: Files, pictures and whole pipelines have tests of their own; these names are records of results.
 LEFT_OUT = {

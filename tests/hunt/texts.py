@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import resource
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,6 @@ def _read_lagrangian(text: str) -> None:
 
 def run_command(words: list[str]) -> str | None:
     """What is wrong with how `lie-codegen WORDS` ended, in this process: a traceback, more than a line of error, another status."""
-    import contextlib
     import io
     import sys
     from unittest import mock
@@ -180,12 +180,17 @@ def corpus(kind: str) -> list[Any]:
     return list(json.loads((CORPUS / f"{kind.replace(' ', '_').lower()}.json").read_text(encoding="utf-8")))
 
 
-def limit_memory() -> None:
-    """Little more memory than is in use: what asks for gigabytes fails at once."""
+@contextlib.contextmanager
+def limited_memory() -> Iterator[None]:
+    """Little more memory than is in use: what asks for gigabytes fails at once. Not around sanitizers, which map terabytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     pages = int(Path("/proc/self/statm").read_text().split()[0]) if Path("/proc/self/statm").exists() else 0
     if pages:
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
         resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + MEMORY, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def hunt(kind: str, examples: int, seed: int = 0) -> tuple[int, list[str]]:
@@ -200,10 +205,15 @@ def hunt(kind: str, examples: int, seed: int = 0) -> tuple[int, list[str]]:
         if verdict is not None:
             found.append(f"{kind}: {value!r:.300}: {verdict}")
 
-    for value in corpus(kind):
-        look(value)
+    with limited_memory():
+        for value in corpus(kind):
+            look(value)
+        _explore(inputs, look, examples, seed)
+    return tried, found
+
+
+def _explore(inputs: st.SearchStrategy[Any], look: Callable[[Any], None], examples: int, seed: int) -> None:
     # No shrinking and no stop at the first: finds are listed, and go to the corpus by hand when they are mended.
     run = given(inputs)(look)
     run = settings(max_examples=examples, deadline=None, database=None, suppress_health_check=list(HealthCheck))(run)
     seeded(seed)(run)()
-    return tried, found

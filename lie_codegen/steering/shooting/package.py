@@ -17,6 +17,7 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.shooting.lie_poisson import transport
 from lie_codegen.steering.shooting.source import PROBLEM, SteeringView, render_steering, steering_view
+from lie_codegen.steering.shooting.stack import LANES, stack_bytes
 
 _VECTORS = 8
 _STEPS, _ROWS = 8, 8
@@ -58,7 +59,8 @@ def render_steering_package(group: MatrixGroup, controls: Sequence[str | int], f
         }
         for vector in vectors
     ]
-    context = {"view": view, "vectors": shown, "example": _example(group), "duration": _DURATION}
+    stack = {"lanes": stack_bytes(view, LANES), "one": stack_bytes(view, 1)}
+    context = {"view": view, "vectors": shown, "example": _example(group), "duration": _DURATION, "stack": stack}
     tree = {
         f"include/{view.prefix}.h": sources[f"{view.prefix}.h"],
         f"src/{view.prefix}.c": sources[f"{view.prefix}.c"],
