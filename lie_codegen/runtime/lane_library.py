@@ -8,7 +8,6 @@ first batch compiles them again for the lanes of this machine. Should that fail,
 from __future__ import annotations
 
 import ctypes
-import json
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -54,9 +53,10 @@ class LaneLibrary:
     def _find_or_compile(self) -> Path:
         home = self._entry.library.parent
         folder = home.parent.parent
-        sources = json.loads((home / _SOURCES).read_text(encoding="utf-8"))
-        if sources["sha256"] != digest(sources["files"]):
-            raise ValueError("the sources of the lanes are damaged")
+        sources = cache.read_json(home / _SOURCES)
+        if not isinstance(sources, dict) or sources.get("sha256") != digest(sources.get("files")):
+            cache.unlink(home / "entry.json")  # the next process builds the whole entry again
+            raise ValueError("the sources of the lanes are gone or damaged")
         compilers = find_compilers()
         compiler = next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
         key = digest(["lanes", home.name, compiler.identity])
