@@ -185,3 +185,7 @@ class AssumptionWarning(UserWarning):
 
 class SpreadWarning(UserWarning):
     """A covariance so wide that its Gaussian passes the cut of the logarithm."""
+
+
+class SlowWarning(UserWarning):
+    """Python is called in a loop that could be compiled."""

@@ -19,6 +19,7 @@
 #include "output_pool.h"
 
 #define MOST_PORTS 32
+#define PIECES_FROM (1 << 20) /* samples from which Python takes pieces, and looks in between whether to stop */
 #define RELEASE_FROM 32 /* samples from which giving up the interpreter lock pays */
 
 typedef struct {
@@ -285,7 +286,7 @@ static PyObject *call_batch(PyObject *callable, PyObject *const *args, size_t na
             goto slowly;
         }
     }
-    if (count < 0) {
+    if (count < 0 || count > PIECES_FROM) {
         goto slowly;
     }
     if (out != NULL) {

@@ -66,7 +66,7 @@ def corollary_check(
         ChartError: if the coordinates leave |g_2| < pi / 2, where the corollaries say nothing.
     """
     group = as_group(group, "corollary_check")
-    eps = checked_scales("corollary_check", u, eps, horizon)
+    eps = checked_scales("corollary_check", float(u.period), eps, horizon)
     averaged = average(group, u, order, "product")
     coordinates, angles, norms = [], [], []
     for value in eps:

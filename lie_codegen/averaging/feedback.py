@@ -18,14 +18,21 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.averaging.order_check import OrderCheck, different_scales, order_report
 from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.flow.feedback_flow import feedback_flow
+from lie_codegen.flow.feedback_law import Feedback
+from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.matrix import wei_norman
+from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.input_formulas import TIME, period_of
 from lie_codegen.signals.signal_values import expressions_of
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
@@ -55,8 +62,8 @@ class Stability:
     statement: str
 
 
-@dataclass(frozen=True)
-class FeedbackAverage:
+@dataclass(frozen=True, eq=False, repr=False)
+class FeedbackAverage(Saved):
     """The averaged feedback system of (18), exact.
 
     Attributes:
@@ -120,6 +127,48 @@ class FeedbackAverage:
         both = self._vanishes_at(point, numbers)
         return Stability(point, jacobian, eigenvalues, stable, both, _statement(stable, both, eigenvalues))
 
+    def order_check(
+        self,
+        g0: ArrayLike,
+        *,
+        eps: Sequence[float] = (0.2, 0.1, 0.05, 0.025),
+        horizon: float = 2.5,
+        **values: Any,
+    ) -> OrderCheck:
+        """The error sup |g - gbar| over [0, horizon/eps] from the same start, for each eps, and the order that it shows: 1.
+
+        Both systems are integrated as `lc.simulate` does a feedback of g; |.| is the largest component.
+
+        Args:
+            g0: (n,) g(0) = gbar(0).
+            eps: two or more positive values, sorted here to decrease.
+            horizon: b.
+            **values: numbers of the parameters, by name.
+
+        Raises:
+            InputError: bad eps or horizon, or a parameter without a value. ChartError: a solution leaves the chart.
+        """
+        numbers = self._numbers(values)
+        start = np.asarray(g0, dtype=float)
+        if start.shape != (self.group.dim,):
+            raise ShapeError(f"order_check: g0 has shape {start.shape}; it must be ({self.group.dim},)")
+        given = {str(name): float(value) for name, value in numbers.items()}
+        period = float(self.period.subs(numbers))
+        chosen = different_scales("order_check", period, eps, horizon)
+        X0 = np.asarray(integrators(self.group).product_exp(start))
+        laws = [Feedback(feedback_kernel(self, given, averaged), "g") for averaged in (False, True)]
+        sup, whole = [], []
+        for value in chosen:
+            # Forty times a period show the ripple within it; whole periods are among them.
+            times = np.arange(max(2, round(40 * horizon / value / period) + 1)) * (period / 40)
+            paths = [
+                feedback_flow(self.group, law, times, np.array(value), X0, rtol=1e-11, chart=start).g for law in laws
+            ]
+            error = np.max(np.abs(paths[0] - paths[1]), axis=1)
+            sup.append(float(np.max(error)))
+            whole.append(float(np.max(error[::40])))
+        return order_report(self.group.name, "feedback", 1, "coordinates", horizon, chosen, sup, whole)
+
     def equilibrium(self, guess: ArrayLike, **values: Any) -> Array:
         """(n,) an equilibrium of the averaged system near a guess, by Newton's method.
 
@@ -158,6 +207,20 @@ class FeedbackAverage:
         return all(np.max(np.abs(np.array(function(t), dtype=float))) < 1e-9 for t in np.linspace(0, length, 37))
 
 
+@kernel_factory()
+def feedback_kernel(
+    average: FeedbackAverage, values: Mapping[str, Any], averaged: bool, name: str = "feedback"
+) -> Kernel:
+    """(t, g) -> u(t, g), or its mean, with numbers for the parameters."""
+    numbers = {symbol: real_number(values[str(symbol)], str(symbol)) for symbol in average.parameters}
+    formulas = (average.u_average if averaged else average.u).subs(numbers)
+    n = average.group.dim
+    ports = (Port("t", (), "s"), Port("g", (n,)))
+    body = expression_body([TIME, average.g], [list(formulas)])
+    return Kernel(name, average.group.name, ports, (Port("u", (n,)),), body, "u(t, g)", "TR 93-59, (17), (18)")
+
+
+@record_factory(group=as_group)
 def feedback_average(
     group: GroupLike, u: Sequence[Any], *, period: Any = "2*pi", parameters: Sequence[str] = ()
 ) -> FeedbackAverage:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.averaged import Averaged, average
+from lie_codegen.averaging.averaged import average
 from lie_codegen.averaging.chart_limit import chart_end
 from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.exact.budget import shown
@@ -103,9 +103,7 @@ def order_check(
         ChartError: the coordinates of the metric reach the edge of their chart.
     """
     group = as_group(group, "order_check")
-    values = tuple(sorted(checked_scales("order_check", u, eps, horizon), reverse=True))
-    if len(set(values)) < max(2, len(values)):
-        raise InputError(f"order_check: eps must hold two or more different positive numbers, got {values}")
+    values = different_scales("order_check", float(u.period), eps, horizon)
     if metric not in METRICS:
         raise InputError(f"order_check: no metric {metric!r}; choose one of {', '.join(METRICS)}")
     averaged = average(group, u, order, form)
@@ -118,7 +116,10 @@ def order_check(
             stacklevel=2,
         )
     sup, whole = measure(group, u, averaged.state, values, horizon, metric)
-    return _report(averaged, metric, horizon, end, values, sup, whole)
+    return order_report(
+        group.name, form, order, metric, horizon, values, sup, whole,
+        end=end, next_rate_vanishes=averaged.next_rate_vanishes, exact_flow=averaged.exact_flow,
+    )  # fmt: skip
 
 
 def measure(
@@ -134,7 +135,19 @@ def measure(
     return sup, whole
 
 
-def checked_scales(where: str, u: PeriodicInput, eps: Sequence[float], horizon: float) -> tuple[float, ...]:
+def different_scales(where: str, period: float, eps: Sequence[float], horizon: float) -> tuple[float, ...]:
+    """Two or more different eps, decreasing.
+
+    Raises:
+        InputError: as `checked_scales`, or they are not.
+    """
+    values = tuple(sorted(checked_scales(where, period, eps, horizon), reverse=True))
+    if len(set(values)) < max(2, len(values)):
+        raise InputError(f"{where}: eps must hold two or more different positive numbers, got {values}")
+    return values
+
+
+def checked_scales(where: str, period: float, eps: Sequence[float], horizon: float) -> tuple[float, ...]:
     """eps as floats.
 
     Raises:
@@ -146,7 +159,7 @@ def checked_scales(where: str, u: PeriodicInput, eps: Sequence[float], horizon: 
     for value in (*eps, horizon):
         if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value <= _LARGEST:
             raise InputError(f"{where}: eps and horizon are positive numbers up to {_LARGEST:g}, got {shown(value)}")
-    periods = horizon / min(eps) / float(u.period)
+    periods = horizon / min(eps) / period
     if not periods <= _PERIODS or not max(eps) <= _LARGEST_EPS:
         raise InputError(
             f"{where}: horizon / eps is {periods:.3g} periods; at most {_PERIODS:g} are simulated, for eps up to {_LARGEST_EPS:g}"
@@ -170,24 +183,30 @@ def _fit(eps: Sequence[float], errors: Sequence[float]) -> float:
     return float(np.polyfit([e for e, _ in above], [x for _, x in above], 1)[0])
 
 
-def _report(
-    averaged: Averaged,
+def order_report(
+    group: str,
+    form: str,
+    order: int,
     metric: str,
     horizon: float,
-    end: float | None,
     eps: tuple[float, ...],
     sup: list[float],
     whole: list[float],
+    *,
+    end: float | None = None,
+    next_rate_vanishes: bool = False,
+    exact_flow: bool = False,
 ) -> OrderCheck:
+    """What the errors of an average for several eps say of its order."""
     measured = slopes(eps, sup)
     exact = all(error <= 50 * _FLOOR for error in sup)
     usable = [slope for slope in measured if np.isfinite(slope)]
     fitted = _fit(eps, sup)
     best = max([fitted, usable[-1]]) if usable else float("-inf")
     return OrderCheck(
-        group=averaged.group.name,
-        form=averaged.form,
-        order=averaged.order,
+        group=group,
+        form=form,
+        order=order,
         metric=metric,
         horizon=horizon,
         eps=eps,
@@ -195,11 +214,11 @@ def _report(
         slopes=tuple(measured),
         whole_period_errors=tuple(whole),
         whole_period_slopes=tuple(slopes(eps, whole)),
-        constant=max(error / e**averaged.order for error, e in zip(sup, eps, strict=True)),
+        constant=max(error / e**order for error, e in zip(sup, eps, strict=True)),
         exact=exact,
-        next_rate_vanishes=averaged.next_rate_vanishes,
-        nilpotent=averaged.exact_flow,
+        next_rate_vanishes=next_rate_vanishes,
+        nilpotent=exact_flow,
         slope=fitted,
         chart_end=end,
-        passed=exact or best >= averaged.order - SHORTFALL,
+        passed=exact or best >= order - SHORTFALL,
     )

@@ -13,6 +13,7 @@ from lie_codegen.control.loop_model import NOISE, Loop
 from lie_codegen.errors import ComputationError
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.sampled_loop import NoiseStream, SampledTask, sampled_loop
+from lie_codegen.runtime.threads import step_pieces
 
 MOST_STEPS = 2**21
 _LARGEST_MOVE = 0.25
@@ -69,23 +70,21 @@ class Run:
     def _continuous(self, every: int) -> Array:
         total = every * (len(self.times) - 1)
         h = (self.times[-1] - self.times[0]) / total
-        block = every * max(1, _BLOCK // every)
-        found = [self.start[None]]
-        for first in range(0, total, block):
-            count = min(block, total - first)
+        found, state, step = [self.start[None]], self.start, self.library.loop_step
+        ranks = {port.name: len(port.shape) for port in step.inputs}
+        for first, count, kept in step_pieces(total, every, _BLOCK):
             clock = self.times[0] + h * (first + np.arange(count))
-            inputs = self.of(
-                "loop_step", {"t": clock[None], "h": h, **self._stages(self.times[0] + h * first, h, count)}
-            )
-            step = self.library.loop_step
+            stages = self._stages(self.times[0] + h * first, h, count)
+            inputs = self.of("loop_step", {"t": clock[None], "h": h, **stages})
             if self.many:
-                state = np.ascontiguousarray(found[-1][-1])
-                runs = step.scan_batch(state, n=count, every=every, threads=self.threads, **inputs)
-                found.append(np.moveaxis(runs[:, 1:], 0, 1))
+                runs = step.scan_batch(state, n=count, every=kept, threads=self.threads, **inputs)
+                made = np.moveaxis(runs[:, 1:], 0, 1)
             else:
-                inputs = {name: value[0] if np.ndim(value) > len(port) else value for (name, value), port in
-                          zip(inputs.items(), (p.shape for p in step.inputs[1:]), strict=True)}  # fmt: skip
-                found.append(np.asarray(step.scan(found[-1][-1, 0], n=count, every=every, **inputs))[1:, None])
+                inputs = {name: x[0] if np.ndim(x) > ranks[name] else x for name, x in inputs.items()}
+                made = np.asarray(step.scan(state[0], n=count, every=kept, **inputs))[1:, None]
+            state = np.ascontiguousarray(made[-1])
+            if (first + count) % every == 0:
+                found.append(made)
         return np.concatenate(found)
 
     def _stages(self, start: float, h: float, count: int) -> dict[str, Array]:
@@ -100,25 +99,25 @@ class Run:
         command = self.loop.plant.sizes[2]
         ring = np.zeros((len(self.start), self.delay, command))
         found = [self._first_call(ring)[None]]
-        per = max(1, _BLOCK // (samples * parts))
-        names = ("loop_sample",) if "loop_sample" in self.library.kernels else ("loop_control", "loop_motion")[::-1]
-        h = self.sample / parts
-        for first in range(0, spans, per):
-            count = min(per, spans - first)
-            task = SampledTask(count, samples, parts, first * samples, command, self.delay)
-            called = self.times[0] + self.sample * (first * samples + np.arange(count * samples + 1))
+        names = ("loop_sample",) if "loop_sample" in self.library.kernels else ("loop_motion", "loop_control")
+        h, state = self.sample / parts, found[0][0]
+        for first, count, kept in step_pieces(spans * samples, samples, max(1, _BLOCK // parts)):
+            task = SampledTask(count // kept, kept, parts, first, command, self.delay)
+            called = self.times[0] + self.sample * (first + np.arange(count + 1))
             moved = (called[:-1, None] + h * np.arange(parts)).ravel()
             reference = {name: x[None] for name, x in self.reference(called[1:]).items()}
-            given = {
+            given: dict[str, dict[str, Any]] = {
                 "loop_sample": {"t": called[None, :-1], "h": self.sample, **reference},
                 "loop_control": {"t": called[None, 1:], "h": self.sample, **reference},
                 "loop_motion": {"t": moved[None], "h": h},
             }
             runs = sampled_loop(
-                self.library, names, np.ascontiguousarray(found[-1][-1]), task,
-                {name: self.of(name, given[name]) for name in names}, self.noise, ring, threads=self.threads,
+                self.library, names, state, task, {name: self.of(name, given[name]) for name in names}, self.noise, ring,
+                threads=self.threads,
             )  # fmt: skip
-            found.append(np.moveaxis(runs, 0, 1))
+            state = np.ascontiguousarray(runs[:, -1])
+            if (first + count) % samples == 0:
+                found.append(np.moveaxis(runs, 0, 1))
         return np.concatenate(found)
 
     def _first_call(self, ring: Array) -> Array:

@@ -26,7 +26,7 @@ def distances(group: MatrixGroup, X: Array, Y: Array, metric: str) -> Array:
         ChartError: the coordinates end before the path does, naming the sample.
     """
     if metric == "product":
-        return np.asarray(np.sum(np.abs(_second_kind(group, X) - _second_kind(group, Y)), axis=1))
+        return np.asarray(np.sum(np.abs(second_kind_along(group, X) - second_kind_along(group, Y)), axis=1))
     if metric == "single":
         return np.asarray(np.sum(np.abs(_logarithms(group, X) - _logarithms(group, Y)), axis=1))
     relative = np.linalg.solve(Y, X)
@@ -48,7 +48,7 @@ def rotation_angle(group: MatrixGroup, R: Array) -> Array:
     return np.asarray(2 * np.arcsin(np.minimum(chord, 1.0)))
 
 
-def _second_kind(group: MatrixGroup, X: Array) -> Array:
+def second_kind_along(group: MatrixGroup, X: Array) -> Array:
     """(k, n) coordinates along a path from the identity, each from the one before by Newton's method."""
     from lie_codegen.flow.chart import mismatch, newton
 

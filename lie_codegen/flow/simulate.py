@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import InputError, NotFiniteError, ShapeError, SlowWarning
 from lie_codegen.flow.events import Event, event_function
 from lie_codegen.flow.events import Function as EventFunction
+from lie_codegen.flow.feedback_flow import FeedbackTrajectory, feedback_flow
+from lie_codegen.flow.feedback_law import Feedback, as_feedback
 from lie_codegen.flow.inputs import Signal, as_drive, as_signal, drive_signal
 from lie_codegen.flow.libraries import step_of
 from lie_codegen.flow.magnus.events import run_events
@@ -85,6 +88,9 @@ def simulate(
     if method not in METHODS:
         raise InputError(f"simulate({group.name}): method is one of {', '.join(METHODS)}; given {method!r}")
     start = _initial(group, X0)
+    law = as_feedback(group, u)
+    if law is not None:
+        return _feedback_run(group, law, times, factors, start, goal, atol, method, steps, events, resolution, threads)
     signal = as_signal(group, _input(group, u), times)
     _check_trajectories(group, start, factors, signal)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
@@ -113,6 +119,36 @@ def simulate(
         group, times, X, run.steps, run.error_estimate, method if method in _FOURTH_ORDER else f"magnus{order}",
         drive.evaluations, drive.resolution, hits, drive, goal, run.multiple,
     )  # fmt: skip
+
+
+def _feedback_run(
+    group: MatrixGroup, law: Feedback, times: Array, eps: Array, start: Array, rtol: float, atol: float,
+    method: str, steps: int | None, events: Sequence[Event], resolution: float | None, threads: int,
+) -> FeedbackTrajectory:  # fmt: skip
+    """A feedback, by the pair 8(5,3): it has no Magnus series, and no time at which it could be read beforehand."""
+    given = {
+        "method": method != "auto",
+        "steps": steps is not None,
+        "events": events,
+        "resolution": resolution is not None,
+    }
+    stray = [name for name, value in given.items() if value]
+    if stray:
+        raise InputError(
+            f"simulate({group.name}): {', '.join(stray)} goes with inputs of time, not with a feedback u(t, {law.reads})"
+        )
+    if start.ndim == 3 and eps.ndim and len(start) != len(eps):
+        raise ShapeError(
+            f"simulate({group.name}): give one number of trajectories; X0 has {len(start)}, eps has {len(eps)}"
+        )
+    if law.slow:
+        warnings.warn(
+            f"simulate({group.name}): u(t, {law.reads}) is a Python function, which is called at every stage of every step: slow, a "
+            "thousand times slower than texts or a Kernel, which run in compiled loops",
+            SlowWarning,
+            stacklevel=4,
+        )
+    return feedback_flow(group, law, times, eps, start, rtol=rtol, atol=atol, threads=threads)
 
 
 def _input(group: MatrixGroup, u: Any) -> Any:

@@ -224,7 +224,9 @@ def _check_kinds(definition: Any, path: str) -> None:
     """Every factory that a definition names is one of this package."""
     if isinstance(definition, Mapping):
         kind = definition.get("kind")
-        if {"kind", "parameters"} <= definition.keys() and not str(kind).startswith("lie_codegen."):
+        # the mappings that `made_from` takes for definitions; another may well have a key "parameters"
+        named = {"kind", "parameters"} <= definition.keys() <= {"kind", "parameters", "units", "member"}
+        if named and not str(kind).startswith("lie_codegen."):
             raise InputError(f"{path} names {kind!r}, which is no value of this package")
         for each in definition.values():
             _check_kinds(each, path)

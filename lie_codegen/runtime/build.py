@@ -21,6 +21,7 @@ from lie_codegen.runtime.extension import prepare_extension
 from lie_codegen.runtime.ladder import compile_entry
 from lie_codegen.runtime.lane_library import ONE_LANE, keep_sources
 from lie_codegen.runtime.library import Library, check_names
+from lie_codegen.runtime.patience import progress
 
 #: Times that an entry may go between its build and its opening.
 _EVICTIONS = 3
@@ -87,9 +88,10 @@ def build_sources(
             entry = cache.find_request(folder, request)
             if entry is not None and (library := _open_or_none(entry)) is not None:
                 return library
-    sources = make_sources()
-    check_names(sources.signatures)
-    return _compile(folder, sources, compilers, requests)
+    with progress("build"):
+        sources = make_sources()
+        check_names(sources.signatures)
+        return _compile(folder, sources, compilers, requests)
 
 
 def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Mapping
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -14,7 +15,8 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.runtime.arguments import bind, checked, describe, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend
-from lie_codegen.runtime.threads import in_parts
+from lie_codegen.runtime.patience import progress
+from lie_codegen.runtime.threads import CALLS, in_parts, step_pieces
 
 if TYPE_CHECKING:
     import inspect
@@ -114,7 +116,8 @@ class Compiled(Generic[Result]):
             mine = [array[start:stop] if stride else array for array, stride in zip(arrays, strides, strict=True)]
             self.backend.batch(stop - start, mine, strides, [array[start:stop] for array in outputs])
 
-        in_parts(some, count, threads)
+        with progress("batch") if count > CALLS else nullcontext():
+            in_parts(some, count, threads)
         return self._wrap(outputs, out, scalars=False)
 
     def scan(self, *args: Any, n: int, every: int = 1, out: Any = None, **named: Any) -> Array:
@@ -147,7 +150,21 @@ class Compiled(Generic[Result]):
         arrays = [state, *arrays]
         if out is not None:
             arrays = unshared(arrays, [trajectory])
-        self.backend.scan(int(n), int(every), arrays, [0, *strides], trajectory)
+        if int(n) <= CALLS:
+            self.backend.scan(int(n), int(every), arrays, [0, *strides], trajectory)
+            return trajectory
+        trajectory[0] = state
+        for first, steps, kept in step_pieces(int(n), int(every), CALLS):
+            made = np.empty((steps // kept + 1, *trajectory.shape[1:]), trajectory.dtype)
+            mine = [
+                state,
+                *(a[first : first + steps] if stride else a for a, stride in zip(arrays[1:], strides, strict=True)),
+            ]
+            self.backend.scan(steps, kept, mine, [0, *strides], made)
+            state = made[-1].copy()
+            if (first + steps) % int(every) == 0:
+                place = (first + steps) // int(every)
+                trajectory[place - len(made) + 2 : place + 1] = made[1:]
         return trajectory
 
     def scan_batch(self, *args: Any, n: int, every: int = 1, out: Any = None, threads: int = 1, **named: Any) -> Array:
@@ -178,9 +195,25 @@ class Compiled(Generic[Result]):
 
         def some(start: int, stop: int) -> None:
             mine = [array if lane == 0 else array[start:stop] for array, (lane, _) in zip(arrays, strides, strict=True)]
-            self.backend.scan_batch(stop - start, int(n), int(every), mine, strides, trajectories[start:stop])
+            if int(n) * (stop - start) <= 2 * CALLS:
+                self.backend.scan_batch(stop - start, int(n), int(every), mine, strides, trajectories[start:stop])
+                return
+            trajectories[start:stop, 0] = mine[0]
+            for first, steps, kept in step_pieces(int(n), int(every), max(1, CALLS // (stop - start))):
+                made = np.empty((stop - start, steps // kept + 1, *port.shape), trajectories.dtype)
+                # each trajectory has its entries of all steps in a row: their place moves on, their strides stay
+                now = [
+                    a if k == 0 or not step else a.reshape(-1)[first * step // _doubles(a) :]
+                    for k, (a, (_, step)) in enumerate(zip(mine, strides, strict=True))
+                ]
+                self.backend.scan_batch(stop - start, steps, kept, now, strides, made)
+                mine[0] = np.ascontiguousarray(made[:, -1])
+                if (first + steps) % int(every) == 0:
+                    place = (first + steps) // int(every)
+                    trajectories[start:stop, place - made.shape[1] + 2 : place + 1] = made[:, 1:]
 
-        in_parts(some, count, threads)
+        with progress("scan_batch") if count * int(n) > CALLS else nullcontext():
+            in_parts(some, count, threads, int(n))
         return trajectories
 
     def drive(
@@ -285,6 +318,11 @@ class Compiled(Generic[Result]):
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
         return f"<{how} kernel {_prototype(self.signature)}>"
+
+
+def _doubles(array: Array) -> int:
+    """Of one entry."""
+    return 2 if array.dtype.kind == "c" else 1
 
 
 def _kernel_of(library: Any, name: str) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -21,7 +21,7 @@ from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend, load_library
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.runtime.sources import build_source
-from lie_codegen.runtime.threads import in_parts
+from lie_codegen.runtime.threads import CALLS, in_parts
 
 
 class Step(Protocol):
@@ -137,9 +137,22 @@ def driven_loop(
     loop = _c_loop if compiled.backend.loop_address(many=False) and _library() else _numpy_loop
 
     def some(first: int, last: int) -> None:
-        moves.append(loop(compiled, plan, u, spans, first, last, found))
+        fixed = spans.knots is not None and plan.count == 1 and not any(step for _, step in plan.strides)
+        size = max(1, CALLS // spans.parts)
+        if not fixed or spans.count <= size:
+            moves.append(loop(compiled, plan, u, spans, first, last, found))
+            return
+        # One long run from knot to knot, in pieces: between two of them Python looks whether to stop.
+        mine, knots = plan, np.asarray(spans.knots)
+        found[0, 0] = plan.arrays[0][0]
+        for begin in range(0, spans.count, size):
+            part = Spans(min(size, spans.count - begin), spans.parts, knots[begin : begin + size + 1])
+            made = np.empty((1, part.count + 1, *found.shape[2:]), found.dtype)
+            moves.append(loop(compiled, mine, u, part, 0, 1, made))
+            found[0, begin + 1 : begin + part.count + 1] = made[0, 1:]
+            mine = replace(mine, arrays=[np.ascontiguousarray(made[:, -1]), *mine.arrays[1:]])
 
-    in_parts(some, plan.count, threads)
+    in_parts(some, plan.count, threads, spans.count * spans.parts)
     return (found if many else found[0]), max(moves)
 
 

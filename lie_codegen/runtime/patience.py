@@ -6,7 +6,8 @@ import functools
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -20,26 +21,34 @@ def _somebody_watches() -> bool:
     return sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
 
 
-def shows_progress(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorates a function that may take long: after a second stderr says how long it has run, once a second.
+@contextmanager
+def progress(what: str) -> Iterator[None]:
+    """What runs inside may take long: after a second stderr says for how long it has run, once a second.
 
-    The line is written by a thread beside the work, is overwritten each time and taken away at the end; of functions that call
+    The line is written by a thread beside the work, is overwritten each time and taken away at the end; of pieces of work inside
     each other the outermost speaks.
     """
+    if not _somebody_watches() or not _busy.acquire(blocking=False):
+        yield
+        return
+    done = threading.Event()
+    speaker = threading.Thread(target=_speak, args=(what, done), daemon=True)
+    speaker.start()
+    try:
+        yield
+    finally:
+        done.set()
+        speaker.join()
+        _busy.release()
+
+
+def shows_progress(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorates a function that may take long: `progress` under its name."""
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:
-        if not _somebody_watches() or not _busy.acquire(blocking=False):
+        with progress(function.__name__):
             return function(*args, **named)
-        done = threading.Event()
-        speaker = threading.Thread(target=_speak, args=(function.__name__, done), daemon=True)
-        speaker.start()
-        try:
-            return function(*args, **named)
-        finally:
-            done.set()
-            speaker.join()
-            _busy.release()
 
     return call
 

@@ -154,7 +154,7 @@ def sampled_loop(
     def some(first: int, last: int) -> None:
         loop(bound, start, task, noise, ring, found, first, last)
 
-    in_parts(some, len(start), threads)
+    in_parts(some, len(start), threads, total * task.parts)
     return found
 
 

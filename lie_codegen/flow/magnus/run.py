@@ -174,7 +174,9 @@ def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, 
     if library is None:
         return numpy_steps.flow(group, drive, steps, order, X0)
     if many is not None:
-        parts = share_out(lambda a, b: library.many(drive, steps, order, X0, a, b), many, threads, _LEAST_TRAJECTORIES)
+        parts = share_out(
+            lambda a, b: library.many(drive, steps, order, X0, a, b), many, threads, _LEAST_TRAJECTORIES, steps.count
+        )
         return np.ascontiguousarray(np.moveaxis(np.concatenate(parts), 0, 1))
     if threads == 1:
         return _in_blocks(library, drive, steps, order, X0)
@@ -198,7 +200,7 @@ def _over_time(library: MagnusLibrary, drive: Drive, steps: Steps, order: int, X
     """Threads as lanes: each takes a run of steps from the identity; X is multiplied by what came before."""
     one = np.eye(len(X0), dtype=X0.dtype)
     runs = share_out(
-        lambda a, b: (library.one(drive, steps, order, one, a, b), a, b), steps.count, threads, _LEAST_STEPS
+        lambda a, b: (library.one(drive, steps, order, one, a, b), a, b), steps.count, threads, _LEAST_STEPS, 1
     )
     found, before = np.zeros((steps.slots, *X0.shape), X0.dtype), X0
     for (X, end), first, last in runs:

@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
+from lie_codegen.runtime.threads import interruptible
 from lie_codegen.steering.direct.numpy_search import NumpySearch
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
 
@@ -65,6 +66,10 @@ class _Programme(ctypes.Structure):
     )  # fmt: skip
 
 
+#: Exponentials of a call that may take a second.
+_LONG = 2**20
+
+
 class CompiledSearch:
     """The functions of the library; the interpreter lock is released while they run."""
 
@@ -110,8 +115,17 @@ class CompiledSearch:
         address = ctypes.addressof(record)
         memory = np.empty(self._memory(address) + _ALIGNED // 8)
         lent = memory.ctypes.data + -memory.ctypes.data % _ALIGNED
-        self._functions[name](address, len(controls), *[a.ctypes.data for a in (controls, *others)], lent)
-        del kept
+        pointers = [a.ctypes.data for a in (controls, *others)]
+        work = len(controls) * record.exponentials * max(settings.reach_iterations, settings.descend_iterations)
+
+        def run() -> tuple[Any, ...]:
+            self._functions[name](address, len(controls), *pointers, lent)
+            return record, kept, memory, controls, others  # alive as long as the call
+
+        if work > _LONG:
+            interruptible(run)
+        else:
+            run()
 
     def _record(self, p: Programme, goal: Goal, settings: Settings) -> tuple[_Programme, dict[str, Array]]:
         """The C record, and the arrays it points to: goals are padded to square matrices, which changes no residual."""

@@ -16,6 +16,7 @@ from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.runtime.patience import shows_progress
 from lie_codegen.steering.ocp.checks import check_problem
 from lie_codegen.steering.ocp.layout import Layout, Shape, check_distinct, layout
 from lie_codegen.steering.ocp.problem import OptimalControlProblem
@@ -34,6 +35,7 @@ from lie_codegen.steering.ocp.terms import Term
 Terms = Term | Sequence[Term]
 
 
+@shows_progress
 def ocp(
     group: GroupLike,
     *,

@@ -17,6 +17,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.runtime.patience import shows_progress
 from lie_codegen.steering.ocp.end import end_error
 from lie_codegen.steering.ocp.free_duration import best_duration
 from lie_codegen.steering.ocp.machine import machine_of
@@ -72,6 +73,7 @@ class OptimalControlProblem:
         """The solver, compiled (or interpreted where there is no compiler) when first asked for."""
         return machine_of(self.data, second_order=second_order)
 
+    @shows_progress
     def solve(
         self,
         X0: ArrayLike | None = None,

@@ -26,6 +26,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
+from lie_codegen.runtime.threads import CALLS, in_parts, interruptible
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import Extremals
 
@@ -140,6 +141,10 @@ def _shooter(group: MatrixGroup, controls: tuple[int | str, ...]) -> Shooter:
     return Shooter(group, report.controls, defaults.starts, library is not None, machine)
 
 
+#: Starts in one call of compiled code, some tenths of a second; between two calls Python looks whether somebody pressed Ctrl-C.
+_STARTS = 1024
+
+
 class _Options(ctypes.Structure):
     _fields_ = (
         ("starts", ctypes.c_int),
@@ -176,9 +181,18 @@ class _CompiledShooting:
         options = self._defaults()
         options.starts = starts
         results = np.zeros(len(targets), self._result)
-        self._solve(
-            len(targets), targets.ctypes.data, weights.ctypes.data, ctypes.addressof(options), results.ctypes.data
-        )
+
+        def some(first: int, last: int) -> None:
+            mine = targets[first:last], results[first:last]
+            self._solve(
+                last - first, mine[0].ctypes.data, weights.ctypes.data, ctypes.addressof(options), mine[1].ctypes.data
+            )
+
+        if starts > _STARTS:
+            for k in range(len(targets)):
+                interruptible(lambda k=k: some(k, k + 1))  # type: ignore[misc]
+        else:
+            in_parts(some, len(targets), 1, CALLS * starts // _STARTS)
         return Extremals(**{name: results[name] for name in Extremals.__dataclass_fields__})
 
     def sample(self, mu0: Array, weights: Array, count: int) -> Array:
