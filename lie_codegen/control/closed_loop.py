@@ -23,6 +23,7 @@ from lie_codegen.control.loop_run import Run, noise_stream, refined
 from lie_codegen.control.loop_states import initial_own, own_states
 from lie_codegen.control.reference_check import check_reference
 from lie_codegen.errors import InputError
+from lie_codegen.exact.budget import shown
 from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.saved import Saved
@@ -285,7 +286,7 @@ def _whole(value: Any, name: str, default: int) -> int:
     if value is None:
         return default
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-        raise InputError(f"closed_loop: {name} is a whole number, not negative; given {value!r}")
+        raise InputError(f"closed_loop: {name} is a whole number, not negative; given {shown(value)}")
     return int(value)
 
 

@@ -11,6 +11,7 @@ import sympy as sp
 
 from lie_codegen.control.reference_motion import TIME, formula_of_time
 from lie_codegen.errors import InputError
+from lie_codegen.exact.budget import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
@@ -43,7 +44,7 @@ def curve_reference(formulas: Sequence[Any], sphere: bool = False) -> CurveRefer
         ExpressionError: a text outside the grammar, with the column.
     """
     if isinstance(formulas, str) or len(formulas) == 0:
-        raise InputError(f"a reference is one formula of t a coordinate, got {formulas!r:.60}")
+        raise InputError(f"a reference is one formula of t a coordinate, got {shown(formulas)}")
     return CurveReference(tuple(formula_of_time(entry) for entry in formulas), bool(sphere))
 
 

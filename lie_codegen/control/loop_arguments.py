@@ -18,6 +18,7 @@ from lie_codegen.control.plants import GroupPlant, Plant, group_plant
 from lie_codegen.control.reference_kernels import reference as make_reference
 from lie_codegen.control.space_plants import named_plant, vibrated
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.budget import shown
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import plain
@@ -87,7 +88,7 @@ def loop_arguments(
         InputError, ShapeError, NotFiniteError: naming the argument.
     """
     if gains is not None and not isinstance(gains, Mapping):
-        raise InputError(f"closed_loop: gains is a mapping such as {{'k_p': 4}}, got {gains!r:.60}")
+        raise InputError(f"closed_loop: gains is a mapping such as {{'k_p': 4}}, got {shown(gains)}")
     times = _times(t)
     designed = None
     if isinstance(law, VibrationalFeedback):
@@ -144,7 +145,7 @@ def _times(t: ArrayLike) -> Array:
     try:
         times = np.asarray(t, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"closed_loop: t must be an array of numbers, got {t!r:.60}") from None
+        raise InputError(f"closed_loop: t must be an array of numbers, got {shown(t)}") from None
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)):
         raise ShapeError(f"closed_loop: t has shape {times.shape}; give at least two finite times")
     gaps = np.diff(times)
@@ -205,7 +206,7 @@ def _reference(plant: Plant, reference: Any) -> Any:
         return make_reference(group, reference)
     if theirs is None:
         raise InputError(
-            f"closed_loop: reference is what lc.reference makes, a plan, or formulas of t, one a component; got {reference!r:.60}"
+            f"closed_loop: reference is what lc.reference makes, a plan, or formulas of t, one a component; got {shown(reference)}"
         )
     return reference
 
@@ -213,7 +214,7 @@ def _reference(plant: Plant, reference: Any) -> Any:
 def _curve(plant: Plant, reference: Any) -> CurveReference:
     if not isinstance(reference, list | tuple):
         raise InputError(
-            f"closed_loop: the reference of {plant.namespace} is one formula of t a coordinate, got {reference!r:.60}"
+            f"closed_loop: the reference of {plant.namespace} is one formula of t a coordinate, got {shown(reference)}"
         )
     return curve_reference(reference, sphere=bool(getattr(plant, "sphere", False)))
 
@@ -243,7 +244,7 @@ def _noise(
     known = (*NOISE, "bias")
     if not isinstance(noise, Mapping):
         raise InputError(
-            f"closed_loop: noise is a mapping such as {{'X': 0.01, 'xi': 0.001, 'u': 0}}, got {noise!r:.60}"
+            f"closed_loop: noise is a mapping such as {{'X': 0.01, 'xi': 0.001, 'u': 0}}, got {shown(noise)}"
         )
     unknown = [str(name) for name in noise if name not in known]
     if unknown:
@@ -265,7 +266,7 @@ def _disturbance(disturbance: Any, numbers: dict[str, Any]) -> Any:
     if disturbance is None or isinstance(disturbance, Kernel):
         return disturbance
     if isinstance(disturbance, str):
-        raise InputError(f"closed_loop: disturbance is one formula a component, got the text {disturbance!r:.60}")
+        raise InputError(f"closed_loop: disturbance is one formula a component, got the text {shown(disturbance)}")
     listed = isinstance(disturbance, Sequence) and all(
         isinstance(each, str) or _is_number(each) for each in disturbance
     )
@@ -275,7 +276,7 @@ def _disturbance(disturbance: Any, numbers: dict[str, Any]) -> Any:
         numbers["disturbance"] = np.asarray(disturbance, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"closed_loop: disturbance is formulas of t, X and xi, one a component, constants, or a Kernel; got {disturbance!r:.60}"
+            f"closed_loop: disturbance is formulas of t, X and xi, one a component, constants, or a Kernel; got {shown(disturbance)}"
         ) from None
     return "input"
 
@@ -295,7 +296,7 @@ def _sampling(
     """Seconds between two calls of the law, None for a continuous one, and the delay in samples."""
     for name, value in (("step", step), ("sample", sample)):
         if value is not None and not (_is_number(value) and np.isfinite(value) and value > 0):
-            raise InputError(f"closed_loop: {name} is a positive number of seconds, got {value!r:.60}")
+            raise InputError(f"closed_loop: {name} is a positive number of seconds, got {shown(value)}")
     asked = [f"noise on {', '.join(noise)}"] if noise else []
     asked += ["a delay"] if delay else []
     asked += ["an observer"] if observer is not None else []
@@ -318,7 +319,7 @@ def _sampling(
         return sample, 0
     if not _is_number(delay) or not np.isfinite(delay) or delay < 0:
         raise InputError(
-            f"closed_loop: delay is a number of samples (an int) or of seconds (a float), got {delay!r:.60}"
+            f"closed_loop: delay is a number of samples (an int) or of seconds (a float), got {shown(delay)}"
         )
     if isinstance(delay, int | np.integer):
         return sample, int(delay)
@@ -337,9 +338,9 @@ def _tolerance(rtol: float | None, tolerance: float | None, step: float | None) 
     if value is None:
         return _RTOL
     if not _is_number(value):
-        raise InputError(f"closed_loop: {name} is a positive number, got {value!r:.60}")
+        raise InputError(f"closed_loop: {name} is a positive number, got {shown(value)}")
     if not np.isfinite(value):
         raise NotFiniteError(f"closed_loop: {name} is {value}; give a positive number")
     if value <= 0:
-        raise InputError(f"closed_loop: {name} must be positive, got {value!r}")
+        raise InputError(f"closed_loop: {name} must be positive, got {shown(value)}")
     return float(value)

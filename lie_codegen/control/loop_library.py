@@ -15,6 +15,7 @@ from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_out
 from lie_codegen.control.loop_model import NOISE, Loop, loop_model
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.budget import shown
 from lie_codegen.kernel.definition import Definition, NoDefinitionError, made_from, plain
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.runtime.build import build_kernels, defined_together
@@ -114,7 +115,7 @@ def spread(port: Port, value: ArrayLike) -> Array:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"closed_loop: {what} is {value!r:.60}; give a number, {port.shape} or (N, {port.shape[0]})"
+            f"closed_loop: {what} is {shown(value)}; give a number, {port.shape} or (N, {port.shape[0]})"
         ) from None
     if not np.all(np.isfinite(array)) and port.name != "limits":
         raise NotFiniteError(f"closed_loop: {what} holds NaN or infinity")
@@ -168,7 +169,7 @@ def several(start: Array, many: bool, loops: int | None, runs: Any) -> tuple[Arr
         ShapeError: two numbers of loops. InputError: runs is no positive integer.
     """
     if runs is not None and (isinstance(runs, bool) or not isinstance(runs, int | np.integer) or runs < 1):
-        raise InputError(f"closed_loop: runs is a positive integer, given {runs!r}")
+        raise InputError(f"closed_loop: runs is a positive integer, given {shown(runs)}")
     if loops is not None and runs is not None and loops != runs:
         raise ShapeError(f"closed_loop: {runs} runs, and inertia, gains or noise for {loops} loops")
     wanted = loops if loops is not None else runs

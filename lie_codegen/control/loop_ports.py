@@ -25,6 +25,7 @@ import numpy as np
 import sympy as sp
 
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.budget import shown
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import Definition, made_from
@@ -122,7 +123,7 @@ def read_law(law: Any, *, directions: Any = None, observer: bool = False, where:
     kernel = law if isinstance(law, Kernel) else getattr(law, "kernel", None)
     if not isinstance(kernel, Kernel):
         raise InputError(
-            f"{where}: law is a Kernel, as lc.tracking_law or lc.attitude_law makes it, or has one as .kernel, got {law!r:.60}"
+            f"{where}: law is a Kernel, as lc.tracking_law or lc.attitude_law makes it, or has one as .kernel, got {shown(law)}"
         )
     ports = tuple(
         LoopPort(port, "velocity") if observer and port.name == "u" else _kind(kernel, port) for port in kernel.inputs

@@ -20,7 +20,7 @@ from lie_codegen.control.reference_motion import (
     formula_reference,
 )
 from lie_codegen.control.retimed_plan import retimed
-from lie_codegen.control.waypoints import waypoint_reference
+from lie_codegen.control.waypoints import sampled_reference, waypoint_reference
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
@@ -179,6 +179,7 @@ def reference(
     *,
     times: ArrayLike | None = None,
     waypoints: ArrayLike | None = None,
+    samples: ArrayLike | None = None,
     start: Any = None,
     smoothing: float | None = None,
     tolerance: float = 1e-8,
@@ -187,7 +188,7 @@ def reference(
 ) -> Reference: ...
 
 
-@record_factory(group=_space, times=doubles, waypoints=doubles, start=doubles)
+@record_factory(group=_space, times=doubles, waypoints=doubles, samples=doubles, start=doubles)
 def reference(
     group: GroupLike | Manifold,
     formulas: Sequence[Any] | Planned | None = None,
@@ -196,6 +197,7 @@ def reference(
     duration: float | None = None,
     times: ArrayLike | None = None,
     waypoints: ArrayLike | None = None,
+    samples: ArrayLike | None = None,
     start: Any = None,
     smoothing: float | None = None,
     tolerance: float = 1e-8,
@@ -209,7 +211,9 @@ def reference(
         plan: the same.
         duration: with a plan without drift: the time [s] it is flown in, from rest to rest, X_d(t) = X(s(t)) with quintics s that stop
             wherever the plan's controls jump: nothing is rounded off.
-        times, waypoints: (k,) and (k, d, d), instead of formulas.
+        times, waypoints: (k,) and (k, d, d), instead of formulas; at rest at both ends.
+        samples: (k, d, d) of a smooth curve at the times, in the place of waypoints: velocities and accelerations are those of
+            polynomials through five neighbours.
         start: (d, d) for formulas.
         smoothing: for a plan: the time before and after a jump of the controls in which it is rounded off [s]; a hundredth of the
             duration if None.
@@ -229,8 +233,13 @@ def reference(
         if not all(hasattr(formulas, name) for name in ("X", "u", "duration")):
             raise InputError("reference: duration= goes with a plan")
         formulas = retimed(cast(Planned, formulas), float(duration))
-    if (formulas is None) == (times is None or waypoints is None):
-        raise InputError(f"a reference on {group.name} is given by formulas, by a plan, or by times and waypoints")
+    if samples is not None and waypoints is not None:
+        raise InputError("reference: give waypoints, to rest at both ends, or samples of a smooth curve, not both")
+    points = waypoints if samples is None else samples
+    if (formulas is None) == (times is None or points is None):
+        raise InputError(
+            f"a reference on {group.name} is given by formulas, by a plan, or by times and waypoints (or times and samples)"
+        )
     if all(hasattr(formulas, name) for name in ("X", "u", "duration")):
         if start is not None:
             raise InputError("reference: a plan begins where it begins; start= goes with formulas")
@@ -240,7 +249,8 @@ def reference(
     if formulas is not None:
         formulas = cast(Sequence[Any], formulas)
         return formula_reference(group, formulas, start=start)
-    return waypoint_reference(group, np.asarray(times), np.asarray(waypoints))
+    made = waypoint_reference if samples is None else sampled_reference
+    return made(group, np.asarray(times), np.asarray(points))
 
 
 def _on_manifold(space: Manifold, formulas: Any) -> CurveReference:

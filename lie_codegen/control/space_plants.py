@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.control.plants import Plant
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.budget import shown
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.flow.product_step import Move
@@ -136,7 +137,7 @@ class SpacePlant:
             rows = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
             raise InputError(
-                f"closed_loop: {what} is {value!r:.60}; give {self.size} numbers, or one row a loop"
+                f"closed_loop: {what} is {shown(value)}; give {self.size} numbers, or one row a loop"
             ) from None
         if rows.ndim not in (1, 2) or rows.shape[-1] != self.size:
             raise ShapeError(f"closed_loop: {what} has shape {rows.shape}; give ({self.size},) or (N, {self.size})")

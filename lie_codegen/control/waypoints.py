@@ -128,3 +128,52 @@ def quintic(
     conditions = np.array([[1, 1, 1], [3, 4, 5], [6, 12, 20]], dtype=float)
     rest = np.linalg.solve(conditions, np.array([move - start - begin / 2, rate - start - begin, bend - begin]))
     return np.vstack([np.zeros_like(move), start, begin / 2, rest])
+
+
+#: Samples at most: each segment is a row of the tables that are compiled.
+_MOST = 1024
+
+
+@record_factory(times=doubles, samples=doubles)
+def sampled_reference(group: MatrixGroup, times: ArrayLike, samples: ArrayLike) -> WaypointReference:
+    """A twice continuously differentiable curve through samples of a smooth one, of fourth order in their distance.
+
+    At each sample p(t) = log(X_i^-1 X(t)) through it and its four nearest neighbours is a polynomial of degree four; there p' is the body
+    velocity, and p'' its rate, for [p', p'] = 0. Quintics join the samples with both.
+
+    Args:
+        group: the group.
+        times: (k,) increasing [s], k >= 5.
+        samples: (k, d, d) elements.
+
+    Raises:
+        ShapeError, InputError: as `waypoint_reference`; fewer than five samples, or more than 1024.
+    """
+    smooth = waypoint_reference(group, times, samples)  # which checks them
+    t, X = smooth.times, smooth.elements
+    if not 5 <= len(t) <= _MOST:
+        raise InputError(
+            f"a reference from samples needs 5 to {_MOST} of them, got {len(t)}; thin them out, or give waypoints="
+        )
+    speed, bend = np.empty((2, len(t), group.dim))
+    for i in range(len(t)):
+        first = min(max(i - 2, 0), len(t) - 5)
+        near = [j for j in range(first, first + 5) if j != i]
+        moves = np.array([_relative_log(group, X[i], X[j], min(i, j)) for j in near])
+        width = float(np.max(np.abs(t[near] - t[i])))
+        powers = ((t[near] - t[i]) / width)[:, None] ** np.arange(1, 5)
+        fit = np.linalg.solve(powers, moves)
+        speed[i], bend[i] = fit[0] / width, 2 * fit[1] / width**2
+    derivation, spans = GroupDerivation(group), np.diff(t)
+    table = [
+        quintic(
+            derivation,
+            _relative_log(group, X[i], X[i + 1], i),
+            speed[i],
+            speed[i + 1],
+            float(spans[i]),
+            (bend[i], bend[i + 1]),
+        )
+        for i in range(len(spans))
+    ]
+    return WaypointReference(group, t, X, np.array(table))

@@ -169,9 +169,9 @@ def _is_square(value: int) -> bool:
 
 
 def shown(value: object) -> str:
-    """The repr of any value, cut; an integer too long to be written is described."""
+    """The repr of any value in one line, cut; an integer too long to be written is described."""
     try:
-        text = repr(value)
+        text = " ".join(repr(value).split())
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} too long to be shown"
     return text if len(text) <= 200 else f"{text[:200]}..."

@@ -16,7 +16,7 @@ from lie_codegen.runtime.arguments import bind, checked, describe, dtype_of, out
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.patience import progress
-from lie_codegen.runtime.threads import CALLS, in_parts, step_pieces
+from lie_codegen.runtime.threads import CALLS, in_parts, step_pieces, stopped
 
 if TYPE_CHECKING:
     import inspect
@@ -208,6 +208,8 @@ class Compiled(Generic[Result]):
                 ]
                 self.backend.scan_batch(stop - start, steps, kept, now, strides, made)
                 mine[0] = np.ascontiguousarray(made[:, -1])
+                if stopped():
+                    return
                 if (first + steps) % int(every) == 0:
                     place = (first + steps) // int(every)
                     trajectories[start:stop, place - made.shape[1] + 2 : place + 1] = made[:, 1:]

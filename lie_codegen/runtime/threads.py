@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 from lie_codegen.errors import InputError
+from lie_codegen.exact.budget import shown
 
 Part = TypeVar("Part")
 
@@ -15,6 +16,7 @@ Part = TypeVar("Part")
 LEAST = 1024
 #: Evaluations of a kernel in one call of compiled code: a twentieth of a second for most, much more than what Python costs in between.
 CALLS = 2**19
+_here = threading.local()
 
 
 def in_parts(work: Callable[[int, int], None], count: int, threads: Any, weight: int = 1) -> None:
@@ -41,7 +43,7 @@ def share_out(work: Callable[[int, int], Part], count: int, threads: Any, least:
         InputError: `threads` is no positive integer.
     """
     if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise InputError(f"threads is an integer of at least 1, given {threads!r}")
+        raise InputError(f"threads is an integer of at least 1, given {shown(threads)}")
     piece = max(8, CALLS // weight // 8 * 8) if weight > 0 else max(1, count)
     parts = min(threads, count // least)
     if parts < 2:
@@ -52,9 +54,10 @@ def share_out(work: Callable[[int, int], Part], count: int, threads: Any, least:
     over = threading.Event()
 
     def share(start: int) -> list[Part]:
+        _here.over = over
         done = []
         for first, last in _pieces(start, min(start + size, count), piece):
-            if over.is_set():
+            if stopped():
                 break
             done.append(work(first, last))
         return done
@@ -66,6 +69,12 @@ def share_out(work: Callable[[int, int], Part], count: int, threads: Any, least:
             return [part for done in waiting for part in done.result()]
         finally:  # Ctrl-C comes to the thread that waits here: the others stop behind the piece that they are at
             over.set()
+
+
+def stopped() -> bool:
+    """Whether the work that this thread has a share of was given up; long shares look between their pieces."""
+    over: threading.Event | None = getattr(_here, "over", None)
+    return over is not None and over.is_set()
 
 
 def _pieces(start: int, stop: int, size: int) -> Iterator[tuple[int, int]]:

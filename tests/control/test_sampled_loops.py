@@ -245,3 +245,29 @@ def test_a_loop_needs_a_group_and_a_law_what_it_reads() -> None:
     assert lc.closed_loop(law=lc.attitude_law("p"), X0=START, t=T) == lc.closed_loop(
         "SO(3)", law=lc.attitude_law("p"), X0=START, t=T
     )
+
+
+def test_an_observer_between_the_sensors_and_the_law() -> None:
+    """Two directions with noise, a gyro with noise and a bias; the filter's step itself is called alone here."""
+    z = np.array([[0, 0, 1], [0.6, 0, 0.8]])
+    observer = lc.observer("so3", directions=z, weights=[1, 0.5], k_p=1.2, k_i=0.3)
+    tilt, bias = Rotation.from_rotvec([0.3, -0.2, 0.1]).as_matrix(), np.array([0.05, -0.08, 0.03])
+    noise = {"y": 0.02, "xi": 0.01, "bias": bias}
+    run = lc.closed_loop(
+        "so3", inertia=J, law=law(), X0=START, xi0=OMEGA, t=T, sample=0.05, rtol=1e-10, observer=observer, noise=noise,
+        seed=5, states={"X_hat": tilt},
+    )  # fmt: skip
+    step = lc.build(observer.kernel)[observer.kernel.name]
+    X, w, X_hat, b = START, OMEGA, tilt, np.zeros(3)
+    for j in range(21):
+        seen = z @ X + 0.02 * normals(5, 0, j, 3, 6).reshape(2, 3)
+        seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+        gyro = w + 0.01 * normals(5, 0, j, 1, 3) + bias
+        felt = gyro - b
+        torque = np.cross(felt, J @ felt) - K_P * Rotation.from_matrix(X_hat).as_rotvec() - K_D * felt
+        if j % 4 == 0:
+            np.testing.assert_allclose(run.X[j // 4], X, atol=1e-8)
+            np.testing.assert_allclose(run.states["X_hat"][j // 4], X_hat, atol=1e-8)
+            np.testing.assert_allclose(run.states["bias"][j // 4], b, atol=1e-8)
+        X_hat, b = step(X_hat, b, gyro, seen, 0.05)
+        X, w = moved(X, w, torque, 0.05)

@@ -57,7 +57,7 @@ LONG = {
     "closed_loop": "lc.closed_loop('so3', inertia=[1, 2, 2], law=lc.attitude_law('pd', inertia=[1, 2, 2], k_d=2), X0=many, t=[0, 1e5], step=.01)",
     "threads": "step.scan_batch(many, [.1, 0, 0], [.1, 0, 0], [.1, 0, 0], .01, n=10**8, every=10**8, threads=2)",
     "scan": "step.scan(np.eye(3), [.1, 0, 0], [.1, 0, 0], [.1, 0, 0], .01, n=10**10, every=10**10)",
-    "shooting": "lc.steer('so4', X, ['L12', 'L13', 'L14'], 5, method='optimal', starts=3000000)",
+    "shooting": "lc.steer('so4', X, ['L12', 'L13', 'L14'], 5, method='optimal', starts=1000000)",
 }
 
 
