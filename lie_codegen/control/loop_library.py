@@ -80,6 +80,13 @@ def loop_numbers(
     ports = {port.name: port for port in loop.number_ports(noisy=True) if port.name != "noise"}
     body = {port.name: port for port in loop.plant.numbers}
     of_law = {p.name: p for law in (loop.law, loop.observer) if law is not None for p in law.numbers}
+    # of a law that somebody wrote down nobody says which of its numbers are gains
+    free = {
+        p.name
+        for law in (loop.law, loop.observer)
+        if law is not None and law.kernel.definition is None
+        for p in law.numbers
+    }
     unknown = [name for name in gains if name not in of_law]
     if unknown:
         has = ", ".join(of_law) or "none"
@@ -94,7 +101,7 @@ def loop_numbers(
         if name in numbers:
             continue
         if name in gains:
-            numbers[name] = checked(port, gains[name])
+            numbers[name] = checked(port, gains[name], positive=name not in free)
         else:
             numbers[name] = _single(inertia, port.shape[0])
     numbers |= {name: spread(ports[name], value) for name, value in others.items()}
@@ -119,6 +126,8 @@ def spread(port: Port, value: ArrayLike) -> Array:
         ) from None
     if not np.all(np.isfinite(array)) and port.name != "limits":
         raise NotFiniteError(f"closed_loop: {what} holds NaN or infinity")
+    if array.ndim == 1 and len(array) not in (1, port.shape[0]):
+        array = array[:, None]  # one a loop, of all components
     if array.ndim > 2 or (array.ndim and array.shape[-1] not in (1, port.shape[0])):
         raise ShapeError(
             f"closed_loop: {what} has shape {array.shape}; give a number, {port.shape} or (N, {port.shape[0]})"
@@ -136,18 +145,25 @@ def _single(inertia: Any, n: int) -> Array:
     return value * np.eye(n) if value.ndim == 0 else np.diag(value) if value.ndim == 1 else value
 
 
-def checked(port: Port, value: ArrayLike) -> Array:
-    """The values of a number, one or one a loop: positive, or symmetric and positive definite.
+def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
+    """The values of a number, one or one a loop: positive, or symmetric and positive definite, if that is wanted.
 
     Raises:
         ShapeError, NotFiniteError, InputError: naming the first that is not.
     """
-    array = np.array(value, dtype=float, order="C")  # ascontiguousarray would make a number an array of one
+    try:
+        array = np.array(value, dtype=float, order="C")  # ascontiguousarray would make a number an array of one
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(
+            f"closed_loop: {port.name} is {shown(value)}; give {port.shape} or (N, *{port.shape})"
+        ) from None
     ranks = (len(port.shape), len(port.shape) + 1)
     if array.ndim not in ranks or array.shape[array.ndim - len(port.shape) :] != port.shape:
         raise ShapeError(f"closed_loop: {port.name} has shape {array.shape}; give {port.shape} or (N, *{port.shape})")
     if not np.all(np.isfinite(array)):
         raise NotFiniteError(f"closed_loop: {port.name} holds NaN or infinity")
+    if not positive:
+        return array
     if len(port.shape) == 2:
         least = np.linalg.eigvalsh((array + np.swapaxes(array, -1, -2)) / 2)[..., 0]
         skew = np.max(np.abs(array - np.swapaxes(array, -1, -2)), axis=(-1, -2))

@@ -211,7 +211,7 @@ def test_disturbances_as_formulas_constants_and_kernels() -> None:
         ({"sample": 0.1, "noise": {"X": -0.1}}, r"noise\['X'\] is negative"),
         ({"sample": 0.1, "noise": {"X": "big"}}, r"noise\['X'\] is 'big'"),
         ({"limits": 0}, "limits must be positive"),
-        ({"limits": [1, 2]}, r"limits has shape \(2,\)"),
+        ({"limits": [[1, 2]]}, r"limits has shape \(1, 2\)"),
         ({"disturbance": "sin(t)"}, "one formula a component"),
         ({"disturbance": ["sin(t)"]}, "the disturbance has 1 components, the command 3"),
         ({"disturbance": ["q", "0", "0"]}, "q"),
@@ -271,3 +271,14 @@ def test_an_observer_between_the_sensors_and_the_law() -> None:
             np.testing.assert_allclose(run.states["bias"][j // 4], b, atol=1e-8)
         X_hat, b = step(X_hat, b, gyro, seen, 0.05)
         X, w = moved(X, w, torque, 0.05)
+
+
+def test_batches_over_limits_and_noise() -> None:
+    options: dict[str, Any] = {"inertia": J, "law": law(), "X0": START, "t": T, "sample": 0.1, "step": 0.05, "seed": 2}
+    spread = np.array([0.0, 0.01, 0.02, 0.05, 0.1])
+    many = lc.closed_loop("so3", **options, noise={"X": spread}, limits=np.arange(1.0, 6)[:, None])
+    for i, sigma in enumerate(spread):
+        alone = lc.closed_loop("so3", **options, noise={"X": sigma}, limits=i + 1.0, first=i)
+        np.testing.assert_allclose(many.X[:, i], alone.X, atol=1e-12)
+    with pytest.raises(ShapeError, match="different numbers of loops"):
+        lc.closed_loop("so3", **options, noise={"X": spread}, limits=np.ones((4, 3)))
