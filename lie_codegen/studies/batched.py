@@ -28,13 +28,18 @@ def batched_call(function: Any, arguments: tuple[Any, ...], options: Mapping[str
         return _kernel(function, options)
     if isinstance(function, Propagator):
         return lambda columns, first, noise: Of(function.group, function.batch(**{**options, **columns}).X)
-    if function is closed_loop and "mpc" not in options:
+    if _is(function, closed_loop) and "mpc" not in options:
         return _loops(arguments, options)
-    if function is simulate:
+    if _is(function, simulate):
         return _flows(arguments, options)
     if isinstance(function, Each) or getattr(function, "__module__", "").split(".")[0] == "lie_codegen":
         return None
     return lambda columns, first, noise: function(*arguments, **{**options, **columns})
+
+
+def _is(function: Any, known: Callable[..., Any]) -> bool:
+    """Whether they are one function, behind the guard of the front door or not."""
+    return callable(function) and inspect.unwrap(function) is inspect.unwrap(known)
 
 
 def _loops(arguments: tuple[Any, ...], options: Mapping[str, Any]) -> Call:
@@ -59,16 +64,22 @@ def _loops(arguments: tuple[Any, ...], options: Mapping[str, Any]) -> Call:
             named["gains"] = gains
         count = len(next(iter(columns.values())))
         if not {"X0", "xi0", "inertia"} & columns.keys():
-            # what tells the loop how many runs there are
-            named["xi0"] = np.broadcast_to(named.get("xi0", np.zeros(group.dim)), (count, group.dim)).copy()
-        return Of(group, closed_loop(*arguments, **named))
+            named["runs"] = count  # what tells the loop how many there are
+        return Of(group, closed_loop(*arguments, **_noisy(named, first, noise)))
 
     return call
 
 
+def _noisy(named: dict[str, Any], first: int, noise: int) -> dict[str, Any]:
+    """The noise of a loop belongs to its sample, whichever chunk it is run in."""
+    if named.get("noise") is None:
+        return named
+    return {"seed": noise, **named, "first": first}
+
+
 def replayed_call(function: Any, arguments: tuple[Any, ...], options: Mapping[str, Any]) -> Call | None:
     """How one sample of a closed loop or a flow is called, without the axis of samples; None for other functions."""
-    if function not in (closed_loop, simulate):
+    if not (_is(function, closed_loop) or _is(function, simulate)):
         return None
     parameters = set(inspect.signature(function).parameters)
 
@@ -79,7 +90,7 @@ def replayed_call(function: Any, arguments: tuple[Any, ...], options: Mapping[st
             (named if name in parameters else gains)[name] = column[0]
         if gains:
             named["gains"] = gains
-        return function(*arguments, **named)
+        return function(*arguments, **(_noisy(named, first, noise) if _is(function, closed_loop) else named))
 
     return call
 

@@ -41,6 +41,23 @@ def test_closed_loops_are_those_of_the_front_door(tmp_path: Path) -> None:
     assert np.array_equal(worst[0].inputs["X0"], study["X0"][worst[0].index])
 
 
+def test_noise_belongs_to_the_sample(tmp_path: Path) -> None:
+    """The same numbers whatever the chunks, another sequence for each sample, and a replay meets its own again."""
+    law = lc.attitude_law("pd", inertia=[1, 2, 3], k_p=4, k_d=6)
+    what = functools.partial(
+        lc.closed_loop, "so3", law=law, inertia=[1, 2, 3], t=np.linspace(0, 4, 5), step=0.05, sample=0.1,
+        noise={"X": 0.01, "xi": 0.02},
+    )  # fmt: skip
+    space = {"xi0": lc.Uniform([0, 0, 0], [1e-12, 0, 0])}
+    runs = [lc.study(what, space, n=24, seed=3, chunk=chunk, store=None, progress=False) for chunk in (24, 7)]
+    assert runs[0].digest() == runs[1].digest()
+    assert len(set(runs[0]["error_final"].tolist())) == 24
+    assert 0.001 < np.mean(runs[0]["error_final"]) < 0.1
+    again = runs[0].replay(11).result
+    angle = 2 * np.arcsin(np.linalg.norm(again.X[-1] - np.eye(3)) / np.sqrt(8))
+    assert angle == pytest.approx(runs[0]["error_final"][11], rel=1e-9)
+
+
 def test_a_steering_study(tmp_path: Path) -> None:
     what = lc.Run(lc.steer, "so3", controls=("w1", "w2"), duration=1.0)
     study = lc.study(what, {"target": lc.OnGroup("so3")}, n=20, store=tmp_path / "s.zarr", progress=False)
