@@ -43,7 +43,7 @@ def gait_path(gait: Any, shape: int, amplitude: float = 1.0, centre: ArrayLike |
     """r(t) = centre + amplitude s(t).
 
     Args:
-        gait: s as a PeriodicInput of `shape` components, or (N, shape) corners joined by straight lines, the last one equal to the first.
+        gait: s as a PeriodicInput of `shape` components (or its formulas), or (N, shape) corners joined by straight lines, the last one equal to the first.
 
     Raises:
         InputError: it does not close, or has parameters without values; ShapeError: another number of components.
@@ -54,6 +54,8 @@ def gait_path(gait: Any, shape: int, amplitude: float = 1.0, centre: ArrayLike |
     size = float(amplitude)
     if not (np.isfinite(size) and np.all(np.isfinite(middle))):
         raise InputError("amplitude and centre must be finite")
+    if isinstance(gait, list | tuple) and gait and all(isinstance(each, str) for each in gait):
+        gait = PeriodicInput(list(gait))
     if isinstance(gait, PeriodicInput):
         return _of_input(gait, shape, size, middle)
     return _of_corners(gait, shape, size, middle)

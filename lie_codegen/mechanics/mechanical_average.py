@@ -22,6 +22,7 @@ from lie_codegen.mechanics.mechanical_kernels import (
     actual_kernel,
     actual_step,
     average_step,
+    loop_kernel,
     rate_kernel,
     reconstruct_kernel,
 )
@@ -214,6 +215,16 @@ class MechanicalAverage(Value):
             reconstruct_kernel(self.fields, back=True),
             reconstruct_kernel(self.fields, back=False),
         )
+
+    def loop(self, eps: float) -> Kernel:
+        """The actual system as (y, t) -> y', y = (xi, advected vectors), of period `period(eps)`: for lc.floquet."""
+        if not eps > 0:
+            raise InputError(f"eps must be positive, got {eps!r}")
+        return loop_kernel(self.fields, float(eps))
+
+    def period(self, eps: float) -> float:
+        """Of the actual forces, in slow time."""
+        return float(eps) * self.fields.forcing.period
 
     @cached_property
     def library(self) -> Library:

@@ -60,6 +60,28 @@ def actual_kernel(fields: MechanicalFields, name: str = "actual") -> Kernel:
     )  # fmt: skip
 
 
+def loop_kernel(fields: MechanicalFields, eps: float, name: str = "loop") -> Kernel:
+    """(y, t) -> y_dot of y = (xi, advected vectors) under the forces of time t: what lc.floquet takes."""
+    system, n = fields.system, fields.system.dim
+    size = len(system.symbols)
+
+    def body(ops: Arithmetic, y: Vector, t: Scalar) -> tuple[Any, ...]:
+        small = ops.constant(eps)
+        alpha, beta = _actual(ops, fields)(list(y), _waves(ops, fields.forcing, t / small), small)
+        return ([*beta, *_advected_rate(ops, system, alpha, list(y[n:]))],)
+
+    y = Port("y", (size,), description=", ".join(map(str, system.symbols)))
+    return Kernel(
+        name,
+        NAMESPACE,
+        (y, Port("t", (), "s")),
+        (Port("y_dot", (size,)),),
+        body,
+        "the actual system, without X",
+        SOURCE,
+    )
+
+
 def average_step(fields: MechanicalFields) -> Kernel:
     """(state, eps, h) -> (state_next,): one step of the averaged system; the state is varying entries of X, xi, Gamma."""
     n, tables = fields.system.dim, [table_of(fields.space, f) for f in fields.solution[0]]

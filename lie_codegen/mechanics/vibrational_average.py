@@ -214,7 +214,7 @@ def vibrational_average(
 
     Args:
         system: of lc.mechanical_system (on a group, any order up to 5), lc.lagrangian_system or lc.routh_reduce.
-        u: lc.PeriodicInput in fast time, one component an input of the system, of zero mean.
+        u: lc.PeriodicInput (or its formulas) in fast time, one component an input of the system, of zero mean.
         order: 1 to 4; on a group 1 to 5.
         gauge: "zero_mean" or "pull_back" (the averaged state equals the actual one at the start of each period).
         mean_to_drift: apply the mean of u as a constant force, not divided by eps.
@@ -224,6 +224,8 @@ def vibrational_average(
 
     Source: Sanyal, Bloch and McClamroch, (14)-(17), (22)-(24), corrected.
     """
+    if isinstance(u, list | tuple) and u and all(isinstance(each, str) for each in u):
+        u = PeriodicInput(list(u))
     if not isinstance(u, PeriodicInput):
         raise InputError(f"vibrational_average: u is {type(u).__name__}; make it a PeriodicInput")
     if isinstance(system, MechanicalSystem):

@@ -261,6 +261,28 @@ def test_gait_in_c():
     np.testing.assert_allclose(end, A.displacement(CIRCLE, amplitude=0.8), atol=2e-9)
 
 
+@pytest.mark.slow
+def test_a_cat_turns_over_within_limits_by_optimal_control():
+    """The open layer in shape space: X' = X hat(-A(r) v), r' = v, |v| <= 3, a given attitude, the back as it was."""
+    cat = lc.example_connection("falling_cat")
+    velocity = next(kernel for kernel in cat.kernels() if kernel.name == "shape_velocity")
+    goal = expm(cat.group.hat((0, 1.0, -2.0)))
+    ends = [f"X{i + 1}{j + 1} - ({goal[i, j]:.15f})" for i, j in ((0, 1), (0, 2), (1, 2))]
+    problem = lc.ocp(
+        "so3", inputs={"v": (2,)}, states={"r": (2,)}, velocity=velocity, rates={"r": ["v1", "v2"]}, duration=6.0, intervals=60,
+        stage_cost="norm2(v)/2", bounds=3.0, terminal=["r1 - 1", "r2", *ends],
+    )  # fmt: skip
+    t, w = (np.arange(60) + 0.5) / 10, np.pi / 3
+    plan = problem.solve(np.eye(3), r=(1.0, 0.0), guess=w * np.stack([-np.sin(w * t), np.cos(w * t)], axis=-1))
+    np.testing.assert_allclose(plan.X[-1], goal, atol=1e-8)
+    assert np.abs(plan.u[:]).max() <= 3 + 1e-9
+
+
+def test_formulas_stand_for_a_gait():
+    X = swimmer().displacement(["cos(t)", "sin(t)"], amplitude=0.8)
+    np.testing.assert_array_equal(X, swimmer().displacement(CIRCLE, amplitude=0.8))
+
+
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [

@@ -227,6 +227,8 @@ def test_inverted_pendulum_threshold_and_frequencies_against_floquet():
         average = lc.vibrational_average(body, u, order=order)
         assert _frequencies(average, up, eps) == pytest.approx(expected, abs=6e-6)
     assert _floquet(J, arm, up, eps) == pytest.approx((1.15605, 2.50895), abs=6e-6)
+    orbit = lc.floquet(average.loop(eps), guess=np.concatenate([np.zeros(3), up]), period=average.period(eps))
+    assert np.sort(np.asarray(orbit.exponents).imag)[-2:] == pytest.approx((1.15605, 2.50895), abs=6e-6)
 
 
 def _frequencies(average, up, eps, step=1e-4):

@@ -88,6 +88,10 @@ SAVED: dict[str, Callable[[], Any]] = {
     "manifold": lambda: lc.manifold(3, constraints=["q1^2 + q2^2 + q3^2 - 1"], inertia=["2", "2 + q1^2", "3"]),
 }
 OTHERS: dict[str, Callable[[], Any]] = {
+    "mechanical average": lambda: lc.vibrational_average(
+        lc.mechanical_system("so3", inertia=(3, 2, 1), inputs=["w1"]), lc.PeriodicInput(["cos(t)"])
+    ),
+    "connection": lambda: lc.connection("se2", shape=("r1",), A=[["1"], ["r1"], ["0"]]),
     "body": lambda: lc.free_rigid_body([1, 2, 3]),
     "euler": lambda: lc.euler_average(lc.free_rigid_body([1, 2, 3]), ["-w1", "-w2", "-w3"]),
     "vibration": vibration,
