@@ -37,8 +37,8 @@ class AttitudeRegion:
     """Whether an initial state lies in the proved region of attraction.
 
     Attributes:
-        value: |theta_0|^2/2 + omega_0' I omega_0/(2 k_p).
-        bound: pi^2/2; inside means value < bound, strictly.
+        value: |theta_0|^2/2 + omega_0' I omega_0/(2 k_p); of a matrix k_p theta_0' k_p theta_0/2 + omega_0' I omega_0/2.
+        bound: pi^2/2; of a matrix k_p its least eigenvalue times that; inside means value < bound, strictly.
         inside: whether convergence is proved. Outside nothing is claimed: many such states converge too.
     """
 
@@ -54,7 +54,8 @@ def attitude_region(theta: ArrayLike, omega: ArrayLike, *, inertia: Any, k_p: An
 
     On it V_0 keeps |theta| < pi. Printed (19), |theta_0|^2/2 + lambda_max |omega_0|^2 <= pi^2/2, is sufficient for
     k_p >= 1/2 only: with k_p = 0.05, k_d = 0.1, theta_0 = 0, omega_0 = (0.9, 0, 0), I = diag(6, 3, 1) it holds and
-    |theta| reaches pi. Geyer, The Attitude Control Problem, Proposition 21.
+    |theta| reaches pi. Geyer, The Attitude Control Problem, Proposition 21. A diagonal or a matrix k_p goes with the torque -J' k_p theta (see
+    `attitude_law`), and theta_0' k_p theta_0/2 + omega_0' I omega_0/2 < lambda_min(k_p) pi^2/2 keeps |theta| < pi.
 
     Raises:
         ShapeError, NotFiniteError: theta or omega is not three finite numbers.
@@ -62,6 +63,10 @@ def attitude_region(theta: ArrayLike, omega: ArrayLike, *, inertia: Any, k_p: An
     """
     I = as_floats(positive_matrix(inertia, 3, "inertia"))  # noqa: E741
     w, a = _three(omega, "omega"), _three(theta, "theta")
+    if np.ndim(k_p) and not isinstance(k_p, str):
+        K = as_floats(positive_matrix(k_p, 3, "k_p"))
+        value, bound = float(a @ K @ a / 2 + w @ I @ w / 2), float(np.linalg.eigvalsh(K)[0] * pi**2 / 2)
+        return AttitudeRegion(value, bound, value < bound)
     value = float(a @ a / 2 + w @ I @ w / (2 * float(positive_number(k_p, "k_p"))))
     return AttitudeRegion(value, pi**2 / 2, value < pi**2 / 2)
 

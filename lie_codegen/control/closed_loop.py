@@ -120,6 +120,7 @@ def closed_loop(
     threads: int = 1,
     external: ForceBody | None = None,
     tolerance: float | None = None,
+    order: int | None = None,
 ) -> ClosedLoop: ...
 
 
@@ -167,6 +168,7 @@ def closed_loop(
     threads: int = 1,
     external: ForceBody | None = None,
     tolerance: float | None = None,
+    order: int | None = None,
     mpc: Any = None,
     values: Mapping[str, Any] | None = None,
     plant: Any = None,
@@ -220,6 +222,7 @@ def closed_loop(
         threads: over which many loops are shared out.
         external: further body forces (ops, t, X, xi) -> (n,) over any arithmetic, as those of `underwater_forces`.
         tolerance: the old name of rtol.
+        order: 1 where the law commands a velocity, 2 where a force; for laws of one's own, whose names do not say it.
         mpc: a controller of `lc.mpc`, instead of group, inertia and law: its loop from t[0] to t[-1], a sample an interval;
             returns its LoopRun, or a tuple of them.
         values: with `mpc` alone, as what follows: states and parameters of the problem, by name.
@@ -260,7 +263,7 @@ def closed_loop(
         )
     told = loop_arguments(
         group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step, sample=sample,
-        delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains,
+        delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains, order=order,
     )  # fmt: skip
     loop, library = loop_library(told.model, told.reference, told.kind)
     numbers, loops = loop_numbers(loop, told.inertia, gains or {}, told.numbers)

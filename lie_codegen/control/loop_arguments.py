@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -81,6 +81,7 @@ def loop_arguments(
     external: Any,
     observer: Any,
     gains: Any,
+    order: int | None = None,
 ) -> LoopArguments:
     """See `closed_loop`.
 
@@ -95,6 +96,7 @@ def loop_arguments(
         designed, law, period = vibrated(law)
         sample = period if sample is None else sample
     read, watching = read_law(law), read_law(observer, observer=True)
+    read = _ordered(read, order)
     plant = _plant(group, read, inertia) if designed is None else designed
     for port in (each for law in (read, watching) if law is not None for each in law.numbers):
         if port.name not in (gains or {}) and (port.name != "inertia" or inertia is None):
@@ -152,6 +154,22 @@ def _times(t: ArrayLike) -> Array:
     if gaps[0] <= 0 or np.max(np.abs(gaps - gaps[0])) > 1e-9 * abs(gaps[0]) * len(times):
         raise InputError("closed_loop: t must increase in equal steps, as numpy.linspace gives them")
     return times
+
+
+def _ordered(law: LoopLaw | None, order: int | None) -> LoopLaw | None:
+    """The law with the order that was told, where its ports do not say it.
+
+    Raises:
+        InputError: another order than 1 or 2, or than the one that the law's ports say.
+    """
+    if order is None or law is None:
+        return law
+    if order not in (1, 2) or isinstance(order, bool):
+        raise InputError(f"closed_loop: order is 1 (the command is a velocity) or 2 (a force), got {order!r:.60}")
+    if law.order not in (None, order):
+        meant = "a velocity" if law.order == 1 else "a force"
+        raise InputError(f"closed_loop: order = {order}, and the law {law.kernel.name} commands {meant}")
+    return replace(law, told=int(order))
 
 
 def _plant(group: Any, law: LoopLaw | None, inertia: Any) -> Plant:

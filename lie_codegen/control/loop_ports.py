@@ -67,12 +67,14 @@ class LoopLaw:
         ports: its inputs.
         directions: (k) the c of y = X^-1 c, exact; none where the law has no input y.
         start: values of its states at the start, by name; those not named are zero, or the identity.
+        told: the order that the user said, where the ports do not; 0 for none.
     """
 
     kernel: Kernel
     ports: tuple[LoopPort, ...]
     directions: tuple[tuple[Any, ...], ...]
     start: Mapping[str, Any]
+    told: int = 0
 
     @cached_property
     def states(self) -> tuple[LoopPort, ...]:
@@ -95,11 +97,11 @@ class LoopLaw:
 
     @cached_property
     def order(self) -> int | None:
-        """1 or 2, as the names of its ports say; None where they do not."""
+        """1 or 2, as the names of its ports say, or as was told; None where neither does."""
         if self.has("velocity"):
             return 2
         named = [order for order, names in _COMMANDS.items() if self.command.name in names]
-        return named[0] if named else None
+        return named[0] if named else self.told or None
 
     def values(self, ops: Any, given: Mapping[str, Any]) -> dict[str, Any]:
         """The outputs by name, from what the loop has: by the kind (of a reference and a state: by the name) of each input."""

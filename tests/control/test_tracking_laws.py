@@ -23,6 +23,7 @@ from lie_codegen.kernel.kernel import Kernel
 SE3_GAINS = {"K_1": [1, 2, 3], "K_2": [[4, 1, 0], [1, 5, 0.5], [0, 0.5, 6]], "K_d": [2, 3, 4, 5, 6, 7]}
 SE3_INERTIA = np.diag([2.0, 3, 4, 5, 6, 8]) + 0.3 * (np.eye(6, k=3) + np.eye(6, k=-3))
 SO3_GAINS = {"K_p": [[3, 0.5, 0], [0.5, 2, 0.1], [0, 0.1, 1]], "K_d": [2, 3, 4]}
+SO3_INERTIA = [[3, 0.5, 0], [0.5, 2, 0.1], [0, 0.1, 1]]
 SE2_GAINS = {"K_1": [1, 2], "K_2": [[4, 1], [1, 5]], "K_d": [2, 3, 4]}
 
 PAIRS = (
@@ -30,6 +31,8 @@ PAIRS = (
     + [("se3", f"se3_{row}", SE3_GAINS, SE3_INERTIA) for row in range(1, 7)]
     + [("se2", f"se2_{row}", SE2_GAINS, [2, 3, 5]) for row in range(1, 7)]
     + [(name, "frobenius", {"k_p": 2, "K_d": 1.5}, [2, 3, 5]) for name in ("h3", "sl2", "su2", "se2")]
+    + [("so3", "so3_geodesic", {"K_p": SO3_INERTIA, "K_d": 1.5}, [6, 4, 3])]
+    + [("h3", "geodesic", {"K_p": SO3_INERTIA, "K_d": 1.5}, [2, 3, 5])]
 )
 
 
