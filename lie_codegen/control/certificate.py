@@ -7,8 +7,8 @@ for the loop as Theorem 4.2 has it: the force of the law itself, all the time, o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from lie_codegen.control.descent import comes_home
 from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples
-from lie_codegen.control.interval_proof import proved_ratio
+from lie_codegen.control.interval_proof import proved_hessian, proved_ratio, proved_transport
 from lie_codegen.control.invariance import invariance
 from lie_codegen.control.level_search import LevelSearch
 from lie_codegen.control.tracking_law import FEEDFORWARDS
@@ -40,6 +40,7 @@ from lie_codegen.kernel.saved import Saved
 
 #: How far beyond the sampled value a bound is tried to be proved, in turn.
 _INFLATED = (1.01, 1.05)
+_UNPROVED = (float("nan"),) * 4
 _LAW = "lie_codegen.control.tracking_law:tracking_law"
 
 
@@ -56,10 +57,11 @@ class Certificate(Saved):
         reach: largest entry of X_d and its inverse, where phi is not left-invariant; infinite where it is.
         b_1, b_2: extreme values of phi/|d phi|^2 that were found.
         b_1_proved, b_2_proved: bounds of these proved in interval arithmetic; NaN where there is no proof.
-        hessian: h = sup |H - d phi . nabla|_I.
-        transport: t = sup |nabla_Z X|_I over unit vectors.
+        hessian, hessian_proved: h = sup |H - d phi . nabla|_I, and a proved bound of it.
+        transport, transport_proved: t = sup |nabla_Z X|_I over unit vectors, and a proved bound of it.
         epsilon, rate, k: of the pointwise certificate: W(t) <= k W(0) exp(-rate t).
         theorem_epsilon, theorem_rate, theorem_k: of Theorem 4.2, by suprema one by one; NaN for other feedforwards than levi_civita.
+        theorem_rate_proved: its rate with the four proved bounds; NaN where one is missing.
         P, Q: (2, 2) its matrices there, P the upper one; P_low proves that W is positive.
         limit_rate: of W by the linearisation about a reference at rest: twice that of its slowest mode.
         critical_points: of phi.
@@ -80,12 +82,15 @@ class Certificate(Saved):
     b_1_proved: float
     b_2_proved: float
     hessian: float
+    hessian_proved: float
     transport: float
+    transport_proved: float
     epsilon: float
     rate: float
     k: float
     theorem_epsilon: float
     theorem_rate: float
+    theorem_rate_proved: float
     theorem_k: float
     P: Array
     P_low: Array
@@ -190,7 +195,7 @@ def certificate(
         overshoot: the largest k that is allowed: the rate is the best under it. Without it the best rate comes with a k of 5 to 8.
         epsilon: of the cross term, instead of the best.
         reach: the largest entry of X_d and its inverse, where phi is not left-invariant and the group not compact; 2 if not given.
-        prove: whether b_1 and b_2 are also proved in interval arithmetic where that is known how: phi = tr(K (1 - R_d^T R))/2 on SO(3).
+        prove: whether b_1, b_2, h and t are also bounded by interval arithmetic where that is known how: phi = tr(K (1 - R_d^T R))/2 on SO(3).
         limits, sample, delay: of a loop that clips, samples or delays its force: refused, as the proof is void there.
         seed: of the search.
 
@@ -250,14 +255,18 @@ def certificate(
     else:
         best = Rate(float(epsilon), pointwise.at(float(epsilon), starts=6), overshoot_of(float(epsilon), b_2))
     stated = theorem.best(overshoot) if feedforward == "levi_civita" else Rate(float("nan"), float("nan"), float("nan"))
-    proved = _proved(pair, gains, body, level, b_1, b_2) if prove else (float("nan"), float("nan"))
+    proved = _proved(pair, gains, metric, level, (b_1, b_2, h, t)) if prove else _UNPROVED
+    sure = float("nan")
+    if feedforward == "levi_civita" and np.all(np.isfinite(proved)):
+        sure = replace(theorem, b_1=proved[0], b_2=proved[1], h=proved[2], t=proved[3]).best(overshoot).rate
     slowest = np.linalg.eigvals(
         np.block([[np.zeros((n, n)), np.eye(n)], [-metric.inverse @ stiffness, -metric.inverse @ K_d]])
     )
     return Certificate(
-        pair, body, K_d, feedforward, float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component), level, float(speed), bound, b_1, b_2, *proved, h, t,
-        best.epsilon, best.rate, best.k, stated.epsilon, stated.rate, stated.k, theorem.P(stated.epsilon), theorem.P(stated.epsilon, -1.0),
-        theorem.Q(stated.epsilon), float(-2 * np.max(slowest.real)), points, _status(pair, points, proved, len(search.places.X)),
+        pair, body, K_d, feedforward, float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component), level,
+        float(speed), bound, b_1, b_2, proved[0], proved[1], h, proved[2], t, proved[3], best.epsilon, best.rate, best.k, stated.epsilon,
+        stated.rate, sure, stated.k, theorem.P(stated.epsilon), theorem.P(stated.epsilon, -1.0), theorem.Q(stated.epsilon),
+        float(-2 * np.max(slowest.real)), points, _status(pair, points, proved, len(search.places.X)),
     )  # fmt: skip
 
 
@@ -296,28 +305,42 @@ def _level(level: float | None, L: float, pair: ErrorFunction) -> float:
 
 
 def _proved(
-    pair: ErrorFunction, gains: Mapping[str, Any], inertia: Array, level: float, b_1: float, b_2: float
-) -> tuple[float, float]:
-    """Bounds near the sampled ones, each proved; NaN where none is."""
+    pair: ErrorFunction,
+    gains: Mapping[str, Any],
+    metric: Metric,
+    level: float,
+    found: tuple[float, float, float, float],
+) -> tuple[float, float, float, float]:
+    """Bounds of b_1, b_2, h and t near the sampled ones, each proved; NaN where none is."""
     if pair.name != "so3_right" or is_claimed(pair):
-        return float("nan"), float("nan")
+        return _UNPROVED
     definition = getattr(pair, "definition", None)
     given = definition["parameters"]["gains"] if definition is not None else gains
-    K = as_floats(attitude_gain(gain(given, "K_p", "the error function so3_right"), 3, "K_p"))
-    above = (f * b_1 for f in _INFLATED if proved_ratio(K, inertia, level, f * b_1, upper=True))
-    below = (b_2 / f for f in _INFLATED if proved_ratio(K, inertia, level, b_2 / f, upper=False))
-    return next(above, float("nan")), next(below, float("nan"))
+    K, I = as_floats(attitude_gain(gain(given, "K_p", "the error function so3_right"), 3, "K_p")), metric.I  # noqa: E741
+    b_1, b_2, h, t = found
+    claims: tuple[tuple[float, Callable[[float], bool]], ...] = (
+        (b_1, lambda f: proved_ratio(K, I, level, f * b_1, upper=True)),
+        (1 / b_2, lambda f: proved_ratio(K, I, level, b_2 / f, upper=False)),
+        (h, lambda f: proved_hessian(K, I, metric.nabla, level, f * h)),
+        (t, lambda f: proved_transport(I, metric.nabla, f * t)),
+    )
+    above, below, hessian, transport = (
+        next((f * value for f in _INFLATED if holds(f)), float("nan")) for value, holds in claims
+    )
+    return above, 1 / below, hessian, transport
 
 
-def _status(pair: ErrorFunction, points: CriticalPoints, proved: tuple[float, float], count: int) -> str:
+def _status(pair: ErrorFunction, points: CriticalPoints, proved: tuple[float, ...], count: int) -> str:
     if pair.uses_log:
         known = "up to the cut locus, L the least of phi there"
     elif not is_claimed(pair) and pair.constant is not None:
         known = "L known"
     else:
         known = f"L from critical points ({points.status})"
-    if np.all(np.isfinite(proved)):
-        bounds = f"b_1 <= {proved[0]:.6g} and b_2 >= {proved[1]:.6g} proved in interval arithmetic"
-    else:
-        bounds = "b_1 and b_2 sampled"
-    return f"{known}; {bounds}; hessian and rates sampled ({count} places and their refinement)"
+    sure = [
+        f"{name} {'>=' if name == 'b_2' else '<='} {value:.6g}"
+        for name, value in zip(("b_1", "b_2", "h", "t"), proved, strict=True)
+        if np.isfinite(value)
+    ]
+    bounds = f"{', '.join(sure)} proved in interval arithmetic" if sure else "b_1, b_2, h and t sampled"
+    return f"{known}; {bounds}; rate sampled ({count} places and their refinement)"

@@ -12,6 +12,7 @@ are proved, all others are cut in eight. Every operation is rounded outwards.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -60,24 +61,46 @@ def proved_ratio(gain: Array, inertia: Array, level: float, bound: float, *, upp
     False says nothing: there may be a counterexample, or the boxes did not suffice.
     """
     claim = _Claim(gain, inertia, bound, 1.0 if upper else -1.0)
-    # (face of the cube, patch, u, v, s or c): the first two as numbers in front
-    boxes = np.array([[[f, p], [-1, 1], [-1, 1], [0, 1]] for f in range(3) for p in range(2)], dtype=float)
+    return _proved(claim, _patches(), level, (1, 2, 3))
+
+
+def proved_hessian(gain: Array, inertia: Array, nabla: Array, level: float, bound: float) -> bool:
+    """Whether |H - d phi . nabla|_I <= bound is proved on all of {phi <= level}; False says nothing."""
+    claims = [_HessianClaim(gain, inertia, nabla, bound, sign) for sign in (1.0, -1.0)]
+    return all(_proved(claim, _patches(), level, (1, 2, 3)) for claim in claims)
+
+
+def proved_transport(inertia: Array, nabla: Array, bound: float) -> bool:
+    """Whether |nabla_Z X|_I <= bound |Z|_I |X|_I is proved; False says nothing."""
+    flat = np.array([[[f, 0], [-1, 1], [-1, 1], [0, 0]] for f in range(3)], dtype=float)
+    return _proved(_TransportClaim(inertia, nabla, bound), flat, 0.0, (1, 2))
+
+
+def _patches() -> Array:
+    """(6, 4, 2): face of the cube and patch, then u, v, and s or c."""
+    return np.array([[[f, p], [-1, 1], [-1, 1], [0, 1]] for f in range(3) for p in range(2)], dtype=float)
+
+
+def _proved(
+    claim: Callable[[Array], tuple[Interval, Interval]], boxes: Array, level: float, sides: tuple[int, ...]
+) -> bool:
+    """Branch and bound: boxes above the level are dropped, those where the margin is not negative are proved, the others cut."""
     counted = len(boxes)
     while len(boxes):
         margin, phi = claim(boxes)
         open_ = (margin.low < 0) & (phi.low <= level)
         if np.any(open_ & (margin.high < 0) & (phi.high <= level)):
             return False
-        boxes = _cut(boxes[open_])
+        boxes = _cut(boxes[open_], sides)
         counted += len(boxes)
         if counted > _MOST_BOXES:
             return False
     return True
 
 
-def _cut(boxes: Array) -> Array:
-    """All three sides halved."""
-    for side in (1, 2, 3):
+def _cut(boxes: Array, sides: tuple[int, ...]) -> Array:
+    """These sides halved."""
+    for side in sides:
         middle = boxes[:, side].mean(axis=1)
         lower, upper = boxes.copy(), boxes.copy()
         lower[:, side, 1] = middle
@@ -101,12 +124,7 @@ class _Claim:
         self.RA, self.form = self.R @ A, np.einsum("ri,ijk->rjk", self.R, form)
 
     def __call__(self, boxes: Array) -> tuple[Interval, Interval]:
-        ones = np.ones(len(boxes))
-        one = Interval(ones, ones)
-        u, v, last = (Interval(boxes[:, side, 0], boxes[:, side, 1]) for side in (1, 2, 3))
-        face, patch = boxes[:, 0, 0].astype(int), boxes[:, 0, 1].astype(int)
-        m = [_chosen(face, [[one, u, u], [u, one, v], [v, v, one]][k]) for k in range(3)]
-        c, s = _chosen(patch, [one, last]), _chosen(patch, [last, one])
+        m, c, s = _places(boxes)
         squares = [_square(x) for x in m]
         mixed = {(j, k): _product(m[j], m[k]) for j, k in ((0, 1), (0, 2), (1, 2))}
         Rw = []
@@ -121,6 +139,101 @@ class _Claim:
         top = _product(_square(s), energy)
         phi = _padded(top.low / whole.high, top.high / whole.low)
         return margin, phi
+
+
+class _HessianClaim:
+    """bound |q|^2 1 + sign |q|^2 L^-1 M L^-T is positive, M = sym H - d phi . nabla, L L^T = I; M is linear in E, so in the monomials of q."""
+
+    def __init__(self, gain: Array, inertia: Array, nabla: Array, bound: float, sign: float) -> None:
+        self.A = np.trace(gain) * np.eye(3) - gain
+        self.S = np.linalg.cholesky(self.A).T
+        root = np.linalg.inv(np.linalg.cholesky(inertia))
+        hat = np.zeros((3, 3, 3))
+        for a, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+            hat[a, k, j], hat[a, j, k] = 1, -1
+        # d phi_a = -tr(K E A_a)/2 and A_a(A_b phi) = -tr(K E A_a A_b)/2, as coefficients of the entries of E
+        slope = -np.einsum("ajk,ki->aij", hat, gain) / 2
+        second = -np.einsum("ajk,bkl,li->abij", hat, hat, gain) / 2
+        M = (second + second.swapaxes(0, 1)) / 2 - np.einsum("abc,cij->abij", (nabla + nabla.swapaxes(0, 1)) / 2, slope)
+        M = np.einsum("ra,abij,sb->rsij", root, M, root)
+        # |q|^2 E = (c^2 - s^2 |m|^2) 1 + 2 s^2 m m^T + 2 c s hat(m): c^2, then s^2 m_i m_j, then c s m_i
+        one = np.eye(3)
+        self.square = bound * one + sign * np.einsum("rsii->rs", M)
+        double = 2 * M - np.einsum("rskk->rs", M)[:, :, None, None] * one
+        self.form = bound * one[:, :, None, None] * one + sign * (double + double.swapaxes(2, 3)) / 2
+        self.cross = 2 * sign * np.einsum("rsij,kij->rsk", M, hat)
+
+    def __call__(self, boxes: Array) -> tuple[Interval, Interval]:
+        m, c, s = _places(boxes)
+        cc, ss, cs = _square(c), _square(s), _product(c, s)
+        squares = [_square(x) for x in m]
+        pairs = {
+            (j, k): _product(ss, squares[j] if j == k else _product(m[j], m[k])) for j in range(3) for k in range(j, 3)
+        }
+        turns = [_product(cs, x) for x in m]
+        B = {}
+        for r in range(3):
+            for t in range(r, 3):
+                terms = [_times(self.square[r, t], cc)]
+                terms += [_times(self.form[r, t, j, k] * (1 if j == k else 2), x) for (j, k), x in pairs.items()]
+                terms += [_times(self.cross[r, t, k], x) for k, x in enumerate(turns)]
+                B[r, t] = B[t, r] = _sum(terms)
+        whole = _sum([cc, *(pairs[k, k] for k in range(3))])
+        energy = _sum([_square(_sum([_times(self.S[i, j], m[j]) for j in range(i, 3)])) for i in range(3)])
+        top = _product(ss, energy)
+        return _positive(B), _padded(top.low / whole.high, top.high / whole.low)
+
+
+class _TransportClaim:
+    """bound^2 |x|^2 1 - B(x)^T B(x) is positive, B(x) z = nabla_z x in orthonormal coordinates: of second degree in x."""
+
+    def __init__(self, inertia: Array, nabla: Array, bound: float) -> None:
+        frame = np.linalg.inv(np.linalg.cholesky(inertia)).T
+        T = np.einsum("abc,cd,ai,bj,dk->ijk", nabla, inertia, frame, frame, frame)
+        gram = np.einsum("ijk,lmk->iljm", T, T)
+        one = np.eye(3)
+        form = bound**2 * one[:, :, None, None] * one - gram
+        self.form = (form + form.swapaxes(2, 3)) / 2
+
+    def __call__(self, boxes: Array) -> tuple[Interval, Interval]:
+        x, _, _ = _places(boxes)
+        pairs = {(j, k): _square(x[j]) if j == k else _product(x[j], x[k]) for j in range(3) for k in range(j, 3)}
+        B = {}
+        for r in range(3):
+            for t in range(r, 3):
+                terms = [_times(self.form[r, t, j, k] * (1 if j == k else 2), y) for (j, k), y in pairs.items()]
+                B[r, t] = B[t, r] = _sum(terms)
+        nothing = np.zeros(len(boxes))
+        return _positive(B), Interval(nothing, nothing)
+
+
+def _positive(B: dict[tuple[int, int], Interval]) -> Interval:
+    """The least of the leading minors of a symmetric (3, 3) matrix: it is positive where that is (Sylvester)."""
+
+    def minor(i: int, j: int, k: int, l: int) -> Interval:  # noqa: E741
+        return _sum([_product(B[i, k], B[j, l]), _times(-1.0, _product(B[i, l], B[j, k]))])
+
+    first, second = B[0, 0], _sum([_product(B[0, 0], B[1, 1]), _times(-1.0, _square(B[0, 1]))])
+    third = _sum(
+        [
+            _product(B[0, 0], minor(1, 2, 1, 2)),
+            _times(-1.0, _product(B[0, 1], minor(1, 2, 0, 2))),
+            _product(B[0, 2], minor(1, 2, 0, 1)),
+        ]
+    )
+    low = np.min([first.low, second.low, third.low], axis=0)
+    # a minor of zero is no positive matrix: the margin must be above it
+    return Interval(np.where(low == 0, -1e-300, low), np.min([first.high, second.high, third.high], axis=0))
+
+
+def _places(boxes: Array) -> tuple[list[Interval], Interval, Interval]:
+    """m, c and s on the boxes."""
+    ones = np.ones(len(boxes))
+    one = Interval(ones, ones)
+    u, v, last = (Interval(boxes[:, side, 0], boxes[:, side, 1]) for side in (1, 2, 3))
+    face, patch = boxes[:, 0, 0].astype(int), boxes[:, 0, 1].astype(int)
+    m = [_chosen(face, [[one, u, u], [u, one, v], [v, v, one]][k]) for k in range(3)]
+    return m, _chosen(patch, [one, last]), _chosen(patch, [last, one])
 
 
 def _chosen(which: Array, choices: list[Interval]) -> Interval:

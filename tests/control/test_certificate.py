@@ -10,7 +10,9 @@ import pytest
 from scipy.linalg import expm
 
 import lie_codegen as lc
+from lie_codegen.control.certificate_constants import Metric
 from lie_codegen.control.error_catalogue import as_error
+from lie_codegen.control.interval_proof import proved_hessian, proved_ratio, proved_transport
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.errors import InputError
 
@@ -77,11 +79,18 @@ def test_bounds_hold_on_fresh_samples_and_the_proof_is_beyond_them() -> None:
     assert ratio.max() <= cert.b_1 <= cert.b_1_proved <= 1.011 * cert.b_1
     assert 0.989 * cert.b_2 <= cert.b_2_proved <= cert.b_2
     assert "proved in interval arithmetic" in cert.status
+    assert cert.hessian <= cert.hessian_proved <= 1.011 * cert.hessian
+    assert cert.transport <= cert.transport_proved <= 1.011 * cert.transport
+    assert 0.9 * cert.theorem_rate < cert.theorem_rate_proved < cert.theorem_rate
+    assert np.isnan(found(level=4.5).theorem_rate_proved)
 
 
 def test_a_false_bound_is_never_proved() -> None:
-    from lie_codegen.control.interval_proof import proved_ratio
-
+    metric = Metric(lc.group("so3"), INERTIA)
+    assert proved_hessian(GAINS["K_p"], INERTIA, metric.nabla, 4.5, 1.01 * 5.0646167)
+    assert not proved_hessian(GAINS["K_p"], INERTIA, metric.nabla, 4.5, 0.99 * 5.0646167)
+    assert proved_transport(INERTIA, metric.nabla, 1.01 * 0.7952147)
+    assert not proved_transport(INERTIA, metric.nabla, 0.99 * 0.7952147)
     unit = np.eye(3)  # I = 1: b_1 = 1/(least of A - level), b_2 = 1/largest of A, both attained
     assert proved_ratio(GAINS["K_p"], unit, 4.5, 1.01 / 4.5, upper=True)
     assert not proved_ratio(GAINS["K_p"], unit, 4.5, 0.97 / 4.5, upper=True)
