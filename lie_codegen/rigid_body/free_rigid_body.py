@@ -21,6 +21,8 @@ from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 
 NAMESPACE = "rigid_body"
+#: Of a matrix of inertia, relative to its largest entry.
+_SYMMETRIC = 1e-12
 
 
 class SlowState(NamedTuple):
@@ -47,10 +49,17 @@ class FreeRigidBody:
     whose inertia depends on the slow time take `tau`.
 
     Attributes:
-        model: the exact body: moments, axes, signs, J, Gamma.
+        model: the exact body: moments, axes, signs, J, Gamma; in principal axes.
+        columns: the principal axes in the user's axes, row by row, of an inertia given as a matrix; None for principal ones.
     """
 
     model: PrincipalBody
+    columns: tuple[tuple[float, ...], ...] | None = None
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3) R with the principal axes as columns, right-handed: inertia = R diag(moments) R^T, omega = R omega_principal."""
+        return np.eye(3) if self.columns is None else np.array(self.columns)
 
     def kernels(self) -> tuple[Kernel, ...]:
         """to_slow, from_slow, frequency and constants_of_motion, for lc.build and lc.generate."""
@@ -75,7 +84,7 @@ class FreeRigidBody:
             InputError: a motion at rest, on the separatrix, about another axis, or of the other sense of spin than
                 this body was made for; the message says which body to make instead.
         """
-        omega = np.asarray(omega, dtype=np.float64)
+        omega = self._principal(omega)
         spin, k, phi = self._call("to_slow", (omega,), tau)
         third, sign = self.model.axes[2]
         along = np.broadcast_to(sign * omega[..., third], np.shape(k))
@@ -103,7 +112,8 @@ class FreeRigidBody:
             InputError: Omega < 0, or k outside [0, 0.999999].
         """
         check_slow(Omega, k)
-        return self._call("from_slow", (Omega, k, phi), tau)[0]
+        omega = self._call("from_slow", (Omega, k, phi), tau)[0]
+        return omega if self.columns is None else np.asarray(omega @ self.rotation.T)
 
     def frequency(self, Omega: ArrayLike, k: ArrayLike, tau: ArrayLike = 0.0) -> Array:
         """Lambda = phi' [1/s] of the torque-free motion: negative where the third axis has the largest inertia."""
@@ -117,7 +127,7 @@ class FreeRigidBody:
 
     def energy_and_momentum(self, omega: ArrayLike, tau: ArrayLike = 0.0) -> tuple[Array, Array]:
         """T [J] and |L| [N m s], (5)."""
-        energy, momentum = self._call("constants_of_motion", (omega,), tau)
+        energy, momentum = self._call("constants_of_motion", (self._principal(omega),), tau)
         return energy, momentum
 
     def adapted_to(self, omega: ArrayLike) -> FreeRigidBody:
@@ -126,7 +136,7 @@ class FreeRigidBody:
         Raises:
             InputError: omega is on the separatrix.
         """
-        vector = np.asarray(omega, dtype=np.float64)
+        vector = self._principal(omega)
         moments = np.array([float(value.subs(TAU, 0)) for value in self.model.inertia])
         energy, momentum = float(moments @ vector**2), float(moments**2 @ vector**2)
         middle = float(np.sort(moments)[1])
@@ -139,7 +149,12 @@ class FreeRigidBody:
             axes = principal_body(self.model.inertia, axis=axis).axes
         third, sign = axes[2]
         spin = 1 if sign * vector[third] >= 0 else -1
-        return FreeRigidBody(PrincipalBody(self.model.inertia, axes, (1, -spin, spin)))
+        return FreeRigidBody(PrincipalBody(self.model.inertia, axes, (1, -spin, spin)), self.columns)
+
+    def _principal(self, omega: ArrayLike) -> Array:
+        """(..., 3) along the principal axes."""
+        vector = np.asarray(omega, dtype=np.float64)
+        return vector if self.columns is None else np.asarray(vector @ self.rotation)
 
     def _other_axis(self, omega: Array) -> str:
         third = self.model.axes[2][0] + 1
@@ -156,7 +171,7 @@ class FreeRigidBody:
 
 
 def free_rigid_body(
-    inertia: Sequence[Any],
+    inertia: Any,
     *,
     axis: str | None = None,
     signs: Sequence[int] = (1, -1, 1),
@@ -165,7 +180,9 @@ def free_rigid_body(
     """The torque-free asymmetric rigid body in elliptic coordinates.
 
     Args:
-        inertia: (I1, I2, I3) [kg m^2], numbers or formulas in tau such as "10 + 0.04*tau^2".
+        inertia: (I1, I2, I3) [kg m^2], numbers or formulas in tau such as "10 + 0.04*tau^2"; or a symmetric (3, 3) matrix of
+            numbers, which is diagonalised: `body.rotation` keeps the principal axes, the moments ascend, and angular velocities
+            stay those of the user's axes.
         axis: "max" or "min", the axis of inertia the motion circles (Table 1); None: the third as given where the
             second moment is the middle one, else "max".
         signs: (s1, s2, s3), product -1; s3 is the sense of spin about the third axis.
@@ -176,7 +193,36 @@ def free_rigid_body(
 
     Source: Coppola, The method of averaging for Euler's equations of rigid body motion, (9)-(15), Table 1.
     """
-    return FreeRigidBody(principal_body(inertia, axis=axis, signs=signs, rates=rates))
+    moments, columns = _diagonalised(inertia)
+    if columns is not None and rates is not None:
+        raise InputError("free_rigid_body: rates are of principal moments; give these, not a matrix")
+    return FreeRigidBody(principal_body(moments, axis=axis, signs=signs, rates=rates), columns)
+
+
+def _diagonalised(inertia: Any) -> tuple[Any, tuple[tuple[float, ...], ...] | None]:
+    """Principal moments, and the axes of a matrix; None where the user's axes are principal."""
+    rows = inertia.tolist() if hasattr(inertia, "tolist") else inertia
+    if (
+        isinstance(rows, str)
+        or not isinstance(rows, Sequence)
+        or not all(isinstance(row, list | tuple) for row in rows)
+    ):
+        return rows, None
+    try:
+        matrix = np.array(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(
+            "free_rigid_body: a matrix of inertia holds numbers; formulas are for principal moments"
+        ) from None
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
+        raise InputError(f"free_rigid_body: inertia {matrix.shape} is no finite (3, 3) matrix and no three moments")
+    if np.max(np.abs(matrix - matrix.T)) > _SYMMETRIC * np.max(np.abs(matrix)):
+        raise InputError("free_rigid_body: the matrix of inertia is not symmetric")
+    if not np.any(matrix - np.diag(np.diag(matrix))):
+        return np.diag(matrix).tolist(), None
+    moments, axes = np.linalg.eigh((matrix + matrix.T) / 2)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))  # right-handed
+    return moments.tolist(), tuple(tuple(row) for row in axes.tolist())
 
 
 def _kernels(model: PrincipalBody) -> tuple[Kernel, ...]:

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.kernel.numpy_arithmetic import evaluate
@@ -138,3 +139,38 @@ def test_refusals_say_why():
         body.to_slow([np.nan, 0, 1])
     with pytest.raises(ShapeError):
         body.to_slow([1.0, 2.0])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_matrix_of_inertia_keeps_its_axes(seed: int) -> None:
+    """Euler's equations with the whole matrix, by scipy, in the user's axes."""
+
+    R = Rotation.random(random_state=seed).as_matrix()
+    J = R @ np.diag([2.0, 3.0, 4.5]) @ R.T
+    J = (J + J.T) / 2
+    omega0 = np.random.default_rng(seed).normal(size=3)
+    body = free_rigid_body(J).adapted_to(omega0)
+    t = np.linspace(0, 12, 7)
+    run = solve_ivp(
+        lambda _, w: np.linalg.solve(J, np.cross(J @ w, w)), (0, 12), omega0, t_eval=t, rtol=1e-11, atol=1e-12
+    )
+    np.testing.assert_allclose(body.motion(omega0, t), run.y.T, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(body.rotation @ np.diag([2.0, 3.0, 4.5]) @ body.rotation.T, J, rtol=0, atol=1e-13)
+    assert np.linalg.det(body.rotation) == pytest.approx(1.0)
+    energy, momentum = body.energy_and_momentum(omega0)
+    assert float(energy) == pytest.approx(omega0 @ J @ omega0 / 2, rel=1e-13)
+    assert float(momentum) == pytest.approx(np.linalg.norm(J @ omega0), rel=1e-13)
+
+
+def test_matrices_of_inertia_that_are_refused() -> None:
+    assert free_rigid_body(np.diag([3.0, 4.0, 5.0])) == free_rigid_body((3.0, 4.0, 5.0))
+    for matrix, words in (
+        ([[2, 1, 0], [0, 3, 0], [0, 0, 4]], "not symmetric"),
+        ([[2, 0], [0, 3]], "no finite"),
+        ([[2, "tau", 0], ["tau", 3, 0], [0, 0, 4]], "holds numbers"),
+        ([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 9]], "above the sum"),
+    ):
+        with pytest.raises(InputError, match=words):
+            free_rigid_body(matrix)
+    with pytest.raises(InputError, match="rates are of principal"):
+        free_rigid_body([[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]], rates=(1, 0, 0))
