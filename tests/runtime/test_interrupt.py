@@ -1,0 +1,69 @@
+"""Ctrl-C ends long compiled work within a second of the processor's time, whatever it is and on however many threads."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lie_codegen as lc
+
+WORK = {
+    "scan_batch": "step.scan_batch(many, u, u, u, 1e-3, n=100_000, every=1000)",
+    "threads": "step.scan_batch(many, u, u, u, 1e-3, n=100_000, every=1000, threads=2)",
+    "sampled": "lc.closed_loop('so3', law=law, inertia=(1, 2, 3), runs=20000, t=t, sample=0.01, noise={'X': 1e-3})",
+    "continuous": "lc.closed_loop('so3', law=law, inertia=(1, 2, 3), xi0=np.ones((20000, 3)), t=t, step=0.01)",
+    "direct": "lc.steer('so3', (0.1, 0.2, 0.3), ('w1', 'w2'), 1.0, method='direct', starts=200000, bounds=30)",
+}
+SETUP = """
+import os, signal, threading, time
+import numpy as np
+import lie_codegen as lc
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background is born deaf to it
+u, t = np.array([0.3, -0.2, 0.5]), np.linspace(0, 400, 401)
+many = np.tile(np.eye(3), (20000, 1, 1))
+step = lc.build(lc.rkmk4_step("so3")).rkmk4_step
+step.scan_batch(many[:9], u, u, u, 1e-3, n=10)
+law = lc.attitude_law("pd", inertia=(1, 2, 3), k_p=4, k_d=6)
+sent = []
+
+def interrupt():
+    sent.append(time.process_time())
+    os.kill(os.getpid(), signal.SIGINT)
+
+timer = threading.Timer(WAIT, interrupt)
+timer.start()
+try:
+    WORK
+except KeyboardInterrupt:
+    print(time.process_time() - sent[0])
+"""
+
+
+@pytest.mark.skipif(os.name != "posix" or not hasattr(signal, "SIGINT"), reason="signals of POSIX")
+@pytest.mark.parametrize("work", WORK)
+def test_of_long_work(work: str, repository: Path) -> None:
+    code = SETUP.replace("WORK", WORK[work]).replace("WAIT", "8" if work in ("sampled", "continuous") else "4")
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1.5  # of two threads at most
+
+
+def test_cutting_changes_nothing() -> None:
+    step = lc.build(lc.rkmk4_step("so3")).rkmk4_step
+    rng = np.random.default_rng(0)
+    starts = np.array([np.eye(3)] * 1001)
+    u = rng.normal(size=(1001, 3))
+    whole = step.scan_batch(starts, u, u, u, 1e-2, n=400, every=400)  # 400,400 steps: in bites
+    for k in (0, 500, 1000):
+        np.testing.assert_array_equal(
+            whole[k],
+            step.scan_batch(starts[k : k + 1], u[k : k + 1], u[k : k + 1], u[k : k + 1], 1e-2, n=400, every=400)[0],
+        )
