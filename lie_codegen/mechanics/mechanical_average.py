@@ -128,14 +128,11 @@ class MechanicalAverage(Value):
             tau: (...) t / eps.
             eps: (...) positive.
         """
-        Y, eta, when, small = self._points(X, xi, tau, eps)
-        return self._flow(Y, eta - self._shift(Y, when), when, -small, small)
+        return self._estimated(X, xi, tau, eps, self.order)
 
     def reconstruct(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike) -> GroupState:
         """The actual state of an averaged one: y = shift(tau) o flow_1(Lambda(tau)) (z)."""
-        Y, eta, when, small = self._points(X, xi, tau, eps)
-        moved = self._flow(Y, eta, when, small, small)
-        return GroupState(moved.X, moved.xi + self._shift(moved.X, when))
+        return self._reconstructed(X, xi, tau, eps, self.order)
 
     def solve(self, X0: ArrayLike, xi0: ArrayLike, t: ArrayLike, eps: float, *, tolerance: float = 1e-11) -> GroupRun:
         """The averaged system from the averaged state (X0, xi0) at t[0], compiled.
@@ -159,11 +156,7 @@ class MechanicalAverage(Value):
 
     def predict(self, X0: ArrayLike, xi0: ArrayLike, t: ArrayLike, eps: float, *, tolerance: float = 1e-11) -> GroupRun:
         """The actual states by the average: estimate the start, solve, reconstruct at every time; error O(eps^order)."""
-        times = states_of(t)
-        z = self.estimate(X0, xi0, times[0] / eps, eps)
-        averaged = self.solve(z.X, z.xi, times, eps, tolerance=tolerance)
-        y = self.reconstruct(averaged.X, averaged.xi, times / eps, eps)
-        return replace(averaged, X=y.X, xi=y.xi)
+        return self._predicted(X0, xi0, states_of(t), eps, tolerance, self.order)
 
     def order_check(
         self,
@@ -181,14 +174,11 @@ class MechanicalAverage(Value):
         """
         period = self.fields.forcing.period
         eps = np.array([t / (N * period + phase) for N in cycles])
-        averages = [
-            MechanicalAverage(self.system, self.u, q, self.gauge, self.constant) for q in range(1, self.order + 1)
-        ]
         errors = np.zeros((self.order, len(eps)))
         for k, small in enumerate(eps):
             actual = self.solve_actual(X0, xi0, [0.0, t], float(small), tolerance=1e-12)
-            for q, average in enumerate(averages):
-                found = average.predict(X0, xi0, [0.0, t], float(small), tolerance=1e-12)
+            for q in range(self.order):
+                found = self._predicted(X0, xi0, np.array([0.0, t]), float(small), 1e-12, q + 1)
                 errors[q, k] = max(np.abs(found.X[-1] - actual.X[-1]).max(), np.abs(found.xi[-1] - actual.xi[-1]).max())
         slopes = np.diff(np.log(errors), axis=1) / np.diff(np.log(eps))
         return VibrationalOrderCheck(eps, errors, slopes, t)
@@ -235,15 +225,41 @@ class MechanicalAverage(Value):
     def _steps(self) -> dict[str, Any]:
         return {}
 
-    def _solved(self, name: str, X0: ArrayLike, xi0: ArrayLike, t: ArrayLike, eps: float, tolerance: float) -> GroupRun:
+    def _estimated(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike, order: int) -> GroupState:
+        Y, eta, when, small = self._points(X, xi, tau, eps)
+        return self._flow(Y, eta - self._shift(Y, when), when, -small, small, order)
+
+    def _reconstructed(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike, order: int) -> GroupState:
+        Y, eta, when, small = self._points(X, xi, tau, eps)
+        moved = self._flow(Y, eta, when, small, small, order)
+        return GroupState(moved.X, moved.xi + self._shift(moved.X, when))
+
+    def _predicted(
+        self, X0: ArrayLike, xi0: ArrayLike, times: Array, eps: float, tolerance: float, order: int
+    ) -> GroupRun:
+        """By F_1 .. F_order and Lambda_1 .. Lambda_{order - 1} alone."""
+        z = self._estimated(X0, xi0, times[0] / eps, eps, order)
+        averaged = self._solved("average_step", z.X, z.xi, times, eps, tolerance, order)
+        y = self._reconstructed(averaged.X, averaged.xi, times / eps, eps, order)
+        return replace(averaged, X=y.X, xi=y.xi)
+
+    def _solved(
+        self, name: str, X0: ArrayLike, xi0: ArrayLike, t: ArrayLike, eps: float, tolerance: float, order: int = MOST
+    ) -> GroupRun:
         small = float(eps)
         if not small > 0:
             raise InputError(f"eps must be positive, got {eps!r}")
         if name not in self._steps:
             make: Callable[[MechanicalFields], Kernel] = average_step if name == "average_step" else actual_step
             self._steps[name] = build([make(self.fields)])[name]
-        per = self.fields.forcing.period * small / 16 if name == "actual_step" else np.inf
-        return run(self.system, self._steps[name], X0, xi0, states_of(t), small, tolerance, per)
+        if name == "actual_step":
+            # a step sees a part of the period alone, before halving begins
+            numbers: dict[str, Any] = {"eps": small}
+            longest = self.fields.forcing.period * small / 16
+        else:
+            powers = [small**q if q < order else 0.0 for q in range(self.order)]
+            numbers, longest = {"weights": np.array(powers)}, np.inf
+        return run(self.system, self._steps[name], X0, xi0, states_of(t), numbers, small, tolerance, longest)
 
     def _check_order(self, q: int, most: int | None = None) -> None:
         most = self.order if most is None else most
@@ -311,9 +327,9 @@ class MechanicalAverage(Value):
         parts = [U[..., a, None] * self._value(lift, state)[..., 1, :] for a, lift in enumerate(self.fields.lifts)]
         return np.asarray(sum(parts[1:], parts[0]))
 
-    def _flow(self, X: Array, xi: Array, when: Array, first: Array, eps: Array) -> GroupState:
+    def _flow(self, X: Array, xi: Array, when: Array, first: Array, eps: Array, order: int) -> GroupState:
         """Unit-time flow of first * sum eps^(q-1) Lambda_q(tau): fourth order on the group, batched."""
-        logarithms = self.fields.solution[1]
+        logarithms = self.fields.solution[1][: order - 1]
         if not logarithms:
             return GroupState(X, xi)
         frozen = [(f, first[..., None] * eps[..., None] ** q * self._at(f, when)) for q, f in enumerate(logarithms)]

@@ -83,17 +83,24 @@ def loop_kernel(fields: MechanicalFields, eps: float, name: str = "loop") -> Ker
 
 
 def average_step(fields: MechanicalFields) -> Kernel:
-    """(state, eps, h) -> (state_next,): one step of the averaged system; the state is varying entries of X, xi, Gamma."""
+    """(state, weights, h) -> (state_next,): one step of sum_q weights_q F_q; the state is varying entries of X, xi, Gamma.
+
+    Weights (1, eps, eps^2, ..) are the average; zeros behind cut it to a lower order, which a check of orders needs.
+    """
     n, tables = fields.system.dim, [table_of(fields.space, f) for f in fields.solution[0]]
 
-    def body(ops: Arithmetic, state: Vector, eps: Scalar, h: Scalar) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, state: Vector, weights: Vector, h: Scalar) -> tuple[Any, ...]:
         def rate(_: float, s: Vector) -> tuple[Vector, Vector]:
-            value = series(ops, Monomials(s), tables, eps, 2 * n)
+            monomials = Monomials(s)
+            value: Vector = [0] * (2 * n)
+            for weight, table in zip(weights, tables, strict=True):
+                value = plus(value, scaled(weight, evaluated(ops, monomials, table, 2 * n)))
             return value[:n], value[n:]
 
         return (moved(ops, fields.system, state, rate, h),)
 
-    return _step(fields.system, "average_step", (_eps(), Port("h", (), "s")), body, "averaged system")
+    weights = Port("weights", (fields.order,), description="1, eps, eps^2, ..")
+    return _step(fields.system, "average_step", (weights, Port("h", (), "s")), body, "averaged system")
 
 
 def actual_step(fields: MechanicalFields) -> Kernel:
@@ -294,7 +301,8 @@ def _step(system: MechanicalSystem, name: str, ports: tuple[Port, ...], body: An
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         rest = [rng.uniform(-1, 1) for _ in system.symbols]
         numbers = {"tau": rng.uniform(0, 6), "eps": rng.uniform(0.01, 0.1), "h": rng.uniform(0, 1e-3)}
-        return [*pack(group, random_element(group, data, rng)), *rest], *(numbers[port.name] for port in ports)
+        numbers_of = [numbers[p.name] if not p.shape else [0.01**q for q in range(p.size)] for p in ports]
+        return [*pack(group, random_element(group, data, rng)), *rest], *numbers_of
 
     return Kernel(
         name, NAMESPACE,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,6 +63,7 @@ def run(
     X0: ArrayLike,
     xi0: ArrayLike,
     times: Array,
+    numbers: Mapping[str, Any],
     eps: float,
     tolerance: float,
     largest: float,
@@ -69,7 +71,8 @@ def run(
     """The states at the times.
 
     Args:
-        step: (state, eps, h), or (state, tau, eps, h) for a system that depends on the fast time.
+        step: (state, .., h), or (state, tau, .., h) for a system that depends on the fast time t / eps.
+        numbers: of the inputs of the step that stay.
         largest: a step is never longer.
 
     Raises:
@@ -86,7 +89,7 @@ def run(
     while grid.largest_step > largest:
         grid = refine(grid, _MOST_STEPS, group.name)
     while True:
-        states, move = _states(step, grid, start, eps, group.dim, packed_size(group))
+        states, move = _states(step, grid, start, numbers, eps, (group.dim, packed_size(group)))
         if coarse is not None and np.isfinite(move):
             estimate = float(np.max(np.abs(states - coarse))) / 15
             scale = max(1.0, float(np.max(np.abs(states))))
@@ -101,9 +104,11 @@ def run(
         grid = refine(grid, _MOST_STEPS, group.name)
 
 
-def _states(step: Compiled[Any], grid: Grid, start: Array, eps: float, n: int, size: int) -> tuple[Array, float]:
+def _states(
+    step: Compiled[Any], grid: Grid, start: Array, numbers: Mapping[str, Any], eps: float, sizes: tuple[int, int]
+) -> tuple[Array, float]:
     """The states at the output times, and the largest |h xi| at the ends of spans; infinite where a state is not finite."""
-    kept, current, move = [start[None]], start, 0.0
+    (n, size), kept, current, move = sizes, [start[None]], start, 0.0
     fast = any(port.name == "tau" for port in step.inputs)
     h = np.repeat(np.diff(grid.knots) / grid.parts, grid.parts)
     begin = (grid.knots[:-1, None] + (np.diff(grid.knots) / grid.parts)[:, None] * np.arange(grid.parts)).ravel()
@@ -112,7 +117,7 @@ def _states(step: Compiled[Any], grid: Grid, start: Array, eps: float, n: int, s
         here = slice(first, min(first + block, grid.steps))
         more = {"tau": np.ascontiguousarray(begin[here] / eps)} if fast else {}
         states = step.scan(
-            current, n=here.stop - first, every=grid.parts, eps=eps, h=np.ascontiguousarray(h[here]), **more
+            current, n=here.stop - first, every=grid.parts, h=np.ascontiguousarray(h[here]), **numbers, **more
         )
         if not np.all(np.isfinite(states)):
             return np.zeros((len(grid.at), len(start))), np.inf
