@@ -205,6 +205,7 @@ from .steering import Pointing as Pointing
 from .steering import Position as Position
 from .steering import Status as Status
 from .steering import UpToPhase as UpToPhase
+from .steering import kinetic_energy_metric as kinetic_energy_metric
 from .steering import momentum_wheels as momentum_wheels
 from .steering import mpc as mpc
 from .steering import ocp as ocp

@@ -7,6 +7,7 @@ from .goals import Coset as Coset
 from .goals import Pointing as Pointing
 from .goals import Position as Position
 from .goals import UpToPhase as UpToPhase
+from .kinetic_metric import kinetic_energy_metric as kinetic_energy_metric
 from .ocp.front import ocp as ocp
 from .ocp.mpc import mpc as mpc
 from .plan import Plan as Plan
