@@ -39,6 +39,7 @@ def pointing_law(
     K_d: Any = 1,
     gyroscopic: str = "none",
     spin: str = "damped",
+    z: Sequence[Any] | None = None,
     name: str = "pointing_law",
 ) -> Kernel:
     """(y, omega) -> (torque): the body axis b is turned towards the direction y = R^T z that the body sees.
@@ -49,6 +50,7 @@ def pointing_law(
         k_p: [N m/rad].
         K_d: [N m s/rad], a number, a diagonal or a matrix.
         gyroscopic: "none" (the law needs no inertia), "cancel" or "double", as `attitude_law`.
+        z: the inertial direction that y shows, for a closed loop; the law itself does not use it.
         spin: "damped", or "free": the momentum about y is kept.
         name: C identifier.
 
@@ -56,6 +58,8 @@ def pointing_law(
         ShapeError, InputError: an axis that is zero or not three numbers, gains that are not positive, an inertia that is missing.
     """
     b = _unit(axis, "axis")
+    if z is not None:
+        _unit(z, "z")
     p, D = positive_number(k_p, "k_p"), positive_matrix(K_d, 3, "K_d")
     factor = gyroscopic_factor(gyroscopic)
     if spin not in _SPINS:

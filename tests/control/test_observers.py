@@ -158,6 +158,9 @@ def test_pointing_law_damps_what_it_says() -> None:
             if spin == "free":
                 momentum = np.cross(y, omega) @ INERTIA @ omega + y @ INERTIA @ turn
                 assert momentum == pytest.approx(0, abs=1e-12)
+    law = lc.pointing_law(axis=b, k_p=4, K_d=5, z=[0, 0, 2])
+    run = lc.closed_loop("so3", law=law, inertia=INERTIA, X0=expm(SO3.hat([1, 0.3, 0])), t=[0, 20, 40], step=0.02)
+    assert run.X[-1].T[:, 2] == pytest.approx(b, abs=1e-4)
     with pytest.raises(InputError, match="needs the inertia"):
         lc.pointing_law(axis=b, gyroscopic="cancel")
 
