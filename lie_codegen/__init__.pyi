@@ -40,6 +40,7 @@ from .averaging import order_check as order_check
 from .averaging import oscillator_areas as oscillator_areas
 from .averaging import oscillator_average as oscillator_average
 from .averaging import phase_average as phase_average
+from .averaging import point_mass_connection as point_mass_connection
 from .averaging import spectral_drift as spectral_drift
 from .averaging import time_average as time_average
 from .averaging import wheel_input as wheel_input

@@ -16,6 +16,7 @@ from .kernels import averaged_kernels as averaged_kernels
 from .magnus import magnus as magnus
 from .order_check import order_check as order_check
 from .phase_system import phase_average as phase_average
+from .point_masses import point_mass_connection as point_mass_connection
 from .shape_connection import connection as connection
 from .shape_examples import example_connection as example_connection
 from .time_system import time_average as time_average

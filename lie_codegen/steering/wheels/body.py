@@ -14,7 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.actuators import MomentumWheels
-from lie_codegen.steering.wheels.frame import body_frame
+from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.values import Value
 
 
@@ -70,7 +70,7 @@ class WheeledBody(Value):
     @cached_property
     def frame(self) -> Array:
         """(3, 3) the basis of the group in body axes, a column each."""
-        return np.array(body_frame(self.group).tolist(), dtype=float)
+        return np.array(body_frame(self.group, "momentum_wheels").tolist(), dtype=float)
 
     def rotation(self, X: ArrayLike) -> Array:
         """(..., 3, 3) the rotation of elements of the group: Ad_X in body axes."""

@@ -28,7 +28,7 @@ from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, cross, matvec, minus, plus, scaled, transpose
 from lie_codegen.mechanics.actuators import MomentumWheels
-from lie_codegen.steering.wheels.frame import body_frame
+from lie_codegen.mechanics.body_frame import body_frame
 
 #: Taylor terms of exp(-hat theta) at a stage: the error is of the sixth order, below that of the step.
 _STAGE_TERMS = 5
@@ -103,7 +103,7 @@ def arguments_of(system: Any) -> dict[str, Any]:
     wheels = system.wheels
     return {
         "group": system.group,
-        "frame": body_frame(system.group).tolist(),
+        "frame": body_frame(system.group, "momentum_wheels").tolist(),
         "inertia": wheels.inertia.tolist(),
         "axes": sp.Matrix(system.directions).tolist(),
         "axial": list(wheels.axial),

@@ -18,12 +18,12 @@ from lie_codegen.errors import InputError, SteeringInputError
 from lie_codegen.groups.build import build
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.ocp.front import ocp
 from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.plan_table import PlanTable, plan_table
 from lie_codegen.steering.wheels.body import WheeledBody
-from lie_codegen.steering.wheels.frame import body_frame
 from lie_codegen.steering.wheels.motion import WheelRun, axial_momenta, element_of, under_torques
 from lie_codegen.steering.wheels.package import system_parts
 from lie_codegen.steering.wheels.torque_problem import torque_problem
@@ -277,7 +277,7 @@ def wheel_basis(system: WheeledBody) -> tuple[MatrixGroup, Array]:
         scale.append(float(factor / rational))
     if len(columns) == 2:
         columns.append(columns[0].cross(columns[1]))
-    frame_inverse = sp.Matrix(body_frame(system.group)).inv()
+    frame_inverse = sp.Matrix(body_frame(system.group, "momentum_wheels")).inv()
     names = [f"wheel{i + 1}" for i in range(system.count)] + ["free"] * (3 - system.count)
     labels = system.group.labels
     combinations = {

@@ -12,13 +12,13 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.wheels.frame import body_frame
+from lie_codegen.mechanics.body_frame import body_frame
 
 
 def read_directions(group: MatrixGroup, axes: Any) -> sp.ImmutableMatrix:
     """(p, 3) exact directions in body axes, of numbers or of labels of the group."""
     rows = axes.tolist() if isinstance(axes, np.ndarray | sp.MatrixBase) else list(axes)
-    frame = body_frame(group)
+    frame = body_frame(group, "momentum_wheels")
     found = []
     for row in rows:
         if isinstance(row, str):

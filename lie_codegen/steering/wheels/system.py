@@ -24,9 +24,9 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.actuators import MomentumWheels
+from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.steering.wheels.body import WheeledBody
-from lie_codegen.steering.wheels.frame import body_frame
 from lie_codegen.steering.wheels.loop import closed_loop_of
 from lie_codegen.steering.wheels.motion import WheelRun, simulated
 from lie_codegen.steering.wheels.package import system_parts
@@ -105,7 +105,7 @@ class WheelSystem(WheeledBody):
                 "momentum_wheels: average is for zero stored momentum, where the rate is a function of time; simulate instead"
             )
         rate = wheel_input(self.wheels, speeds)
-        return average(self.group, rate.linear(body_frame(self.group).inv()), order, form)
+        return average(self.group, rate.linear(body_frame(self.group, "momentum_wheels").inv()), order, form)
 
     def closed_loop(
         self,
@@ -181,7 +181,7 @@ def momentum_wheels(
         ShapeError: wrong shapes.
     """
     group = as_group(group, "momentum_wheels")
-    body_frame(group)
+    body_frame(group, "momentum_wheels")
     directions = read_directions(group, axes)
     p = directions.rows
     wheels = MomentumWheels(

@@ -8,7 +8,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 
-def body_frame(group: MatrixGroup) -> sp.ImmutableMatrix:
+def body_frame(group: MatrixGroup, where: str) -> sp.ImmutableMatrix:
     """(3, 3) the basis of the group in body axes, a column each, exact.
 
     Raises:
@@ -20,5 +20,5 @@ def body_frame(group: MatrixGroup) -> sp.ImmutableMatrix:
     if group.dim == 3 and group.degree == 3 and all(-m == m.T for m in group.exact_basis):
         return sp.ImmutableMatrix.hstack(*(sp.Matrix([m[2, 1], m[0, 2], m[1, 0]]) for m in group.exact_basis))
     raise InputError(
-        f"momentum_wheels: {group.name} is not a group of rotations: give so3 in any basis (3 x 3 matrices), or su2"
+        f"{where}: {group.name} is not a group of rotations: give so3 in any basis (3 x 3 matrices), or su2"
     )
