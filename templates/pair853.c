@@ -260,3 +260,78 @@ EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const d
         memcpy(y_out + c * p->size, after, (size_t)p->size * sizeof(double));
     }
 }
+
+/* ---- Gauss collocation of order 6, equal steps: what is quadratic in y is kept to rounding, whatever the number of steps ---- */
+
+enum { POINTS = 3, MOST_ROUNDS = 60 };
+static const double gauss_c[POINTS] = {0.1127016653792583115, 0.5, 0.8872983346207416885};
+static const double gauss_b[POINTS] = {5.0 / 18, 4.0 / 9, 5.0 / 18};
+static const double gauss_a[POINTS][POINTS] = {
+    {5.0 / 36, -0.03597666752493890346, 0.009789444015308326049},
+    {0.3002631949808645924, 2.0 / 9, -0.02248541720308681464},
+    {0.2679883337624694517, 0.4804211119693833479, 5.0 / 36}};
+
+/*
+ * One member: `spans` times `parts` steps of length h, states kept at the ends of the spans, from p->X, p->y at p->t. The stages are
+ * found by iterating until their change no longer shrinks; they begin with those of the step before.
+ */
+EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts);
+EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts)
+{
+    const ptrdiff_t n = p->size;
+    double *k = p->work, *stage = k + n * POINTS, *fresh = stage + n, *scratch = p->work + n * STAGES, *low = fresh + n;
+    const double start = p->t;
+    for (ptrdiff_t i = 0; i < n; ++i) { low[i] = 0.0; }
+    rates(p, p->X, p->y, p->t, k);
+    for (int s = 1; s < POINTS; ++s) { memcpy(k + s * n, k, (size_t)n * sizeof(double)); }
+    for (ptrdiff_t step = 0; step < spans * parts; ++step) {
+        double before = INFINITY, angle = 0.0;
+        p->t = start + (double)step * p->h;
+        for (int round = 0;; ++round) {
+            double change = 0.0, size = 0.0;
+            for (int s = 0; s < POINTS; ++s) { /* a stage uses those that were renewed before it */
+                for (ptrdiff_t i = 0; i < n; ++i) {
+                    stage[i] = p->y[i] + p->h * (gauss_a[s][0] * k[i] + gauss_a[s][1] * k[n + i] + gauss_a[s][2] * k[2 * n + i]);
+                }
+                rates(p, p->X, stage, p->t + gauss_c[s] * p->h, fresh);
+                for (ptrdiff_t i = 0; i < n; ++i) {
+                    const double d = fabs(fresh[i] - k[s * n + i]), x = fabs(fresh[i]);
+                    change = !(d <= change) ? d : change;
+                    size = !(x <= size) ? x : size;
+                    k[s * n + i] = fresh[i];
+                }
+            }
+            if (!(change <= 1e300)) {
+                return round ? STUCK : LOST; /* the iteration runs away */
+            }
+            if (change <= 4e-16 * size || (change >= before && change <= 1e-13 * size)) {
+                break;
+            }
+            if (round == MOST_ROUNDS) {
+                return STUCK;
+            }
+            before = change;
+        }
+        for (ptrdiff_t i = 0; i < n; ++i) { /* the sum in two doubles, but for Theta, which begins at zero */
+            const double more = p->h * (gauss_b[0] * (k[i] + k[2 * n + i]) + gauss_b[1] * k[n + i]);
+            if (i < p->group) {
+                p->y[i] = more;
+                angle += more * more;
+            } else {
+                const double add = more + low[i], sum = p->y[i] + add;
+                low[i] = add - (sum - p->y[i]);
+                p->y[i] = sum;
+            }
+        }
+        if (angle > p->reach * p->reach) {
+            return STUCK;
+        }
+        settle(p, p->X, p->y, scratch);
+        ++p->steps;
+        if ((step + 1) % parts == 0) {
+            keep(p, p->X, p->y);
+        }
+    }
+    p->t = start + (double)(spans * parts) * p->h;
+    return DONE;
+}

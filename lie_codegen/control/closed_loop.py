@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Never, overload
+from typing import Any, Literal, NamedTuple, Never, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.control.curve_reference import CurveReference, check_curve
 from lie_codegen.control.disturbance import ForceBody
+from lie_codegen.control.loop_adaptive import adaptive, by_gauss, loop_events, loop_system, states_within
 from lie_codegen.control.loop_arguments import LoopArguments, loop_arguments
 from lie_codegen.control.loop_error import loop_error
 from lie_codegen.control.loop_library import loop_library, loop_numbers, several
@@ -24,6 +25,8 @@ from lie_codegen.control.loop_states import initial_own, own_states
 from lie_codegen.control.reference_check import check_reference
 from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import shown
+from lie_codegen.flow.events import Event, EventHits
+from lie_codegen.flow.pair853 import PairRun
 from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.saved import Saved
@@ -42,11 +45,12 @@ class ClosedLoop(Saved):
             the true state; and its own states (integral).
         X_d, xi_d: the reference, (k, d, d) and (k, n), or None.
         steps: number of integration steps.
-        error_estimate: difference to the run with twice the step, over 15 (Richardson); NaN for a fixed step.
+        error_estimate: from the difference to a run with larger local errors, or with twice the step; NaN for a fixed step.
         u: (k, m) the command that acts from each time on, within the limits, its noise and its delay included; (k, N, m).
             None without a law.
         states: the law's and the observer's own states by name, (k, ...) or (k, N, ...): as the law used them at that time.
         group: the group, or None for a mechanism that is not on one.
+        events: what was found of each event, in their order.
     """
 
     t: Array
@@ -60,6 +64,7 @@ class ClosedLoop(Saved):
     u: Array | None = None
     states: dict[str, Array] = field(default_factory=dict)
     group: Any = None
+    events: tuple[EventHits, ...] = ()
 
     @cached_property
     def error(self) -> Array:
@@ -70,6 +75,26 @@ class ClosedLoop(Saved):
         """
         return loop_error(self.group, self.X, self.X_d)
 
+    def at(self, t: ArrayLike) -> tuple[Array, Array]:
+        """(X, xi) at other times of a single loop, (d, d) and (n,), or (k, d, d) and (k, n): by fresh steps, as exact as the run.
+
+        Raises:
+            InputError: a time outside the run; several loops; a run by equal steps; one that was loaded or unpickled.
+        """
+        made: LoopMaking | None = vars(self).get("_making")
+        if made is None or made.pair is None or made.run.many:
+            raise InputError(
+                "ClosedLoop.at: only of a single loop that closed_loop(rtol=...) ran here, on a group; run it again"
+            )
+        moments = np.asarray(t, dtype=float)
+        wanted = np.atleast_1d(moments)
+        if wanted.ndim != 1 or not np.all((wanted >= self.t[0]) & (wanted <= self.t[-1])):
+            raise InputError(
+                f"ClosedLoop.at: t must be a number or (k,) numbers from {self.t[0]:.9g} to {self.t[-1]:.9g}"
+            )
+        X, xi = made.run.loop.plant.split(states_within(made.run, made.pair, wanted))
+        return (X, xi) if moments.ndim else (X[0], xi[0])
+
     def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:
         """The law as C with <name>_loop.c, which runs the first loop without noise, as `lc.generate(run, folder)` writes them.
 
@@ -79,7 +104,11 @@ class ClosedLoop(Saved):
         made: LoopMaking | None = vars(self).get("_making")
         if made is None:
             raise InputError("generate: a loop that was loaded does not know its law any more; run closed_loop again")
-        return loop_parts(made.run, made.reference, made.parts, name, real)
+        run, parts = made.run, made.parts
+        if not parts:  # steps of any length are nothing to take home: the equal ones that are as good
+            run = run_in_steps(run, made.told)
+            parts = refined(run, made.told.rtol, _narrower)[1]
+        return loop_parts(run, made.told.reference, parts, name, real)
 
     def _made_by(self, making: LoopMaking) -> ClosedLoop:
         object.__setattr__(self, "_making", making)  # beside the fields: neither == nor a pickle sees it
@@ -87,11 +116,12 @@ class ClosedLoop(Saved):
 
 
 class LoopMaking(NamedTuple):
-    """What ran a loop."""
+    """What ran a loop; no parts where its steps were of any length."""
 
     run: Run
-    reference: Any
+    told: LoopArguments
     parts: int
+    pair: PairRun | None = None
 
 
 @overload
@@ -121,6 +151,8 @@ def closed_loop(
     external: ForceBody | None = None,
     tolerance: float | None = None,
     order: int | None = None,
+    events: Sequence[Event] = (),
+    method: Literal["auto", "gauss"] = "auto",
 ) -> ClosedLoop: ...
 
 
@@ -169,6 +201,8 @@ def closed_loop(
     external: ForceBody | None = None,
     tolerance: float | None = None,
     order: int | None = None,
+    events: Sequence[Event] = (),
+    method: Literal["auto", "gauss"] = "auto",
     mpc: Any = None,
     values: Mapping[str, Any] | None = None,
     plant: Any = None,
@@ -200,8 +234,10 @@ def closed_loop(
         X0: (d, d) or (N, d, d) initial configurations, the identity if not given.
         xi0: (n,) or (N, n) initial body velocities, zero if not given.
         t: (k,) equally spaced times.
-        rtol: on the entries of the state at the times t, absolute: steps are halved until two runs agree; 1e-10 if neither it
-            nor `step` is given. Of more than 64 sampled loops 64 are watched.
+        rtol: on the entries of the state at the times t, absolute; 1e-10 if neither it nor `step` is given. A law that acts
+            continuously on a group goes by the pair 8(5,3), whose local errors are made smaller until two runs agree; of many
+            loops the local tolerance is found by sixteen, and each block of 64 holds it. Otherwise steps are halved until two
+            runs agree; of more than 64 sampled loops 64 are watched.
         step: integration step [s].
         sample: [s] from one call of the law to the next; the times t must fall on calls.
         delay: from the measurement to when its command acts: an int counts samples, a float is in seconds, a multiple of
@@ -223,6 +259,9 @@ def closed_loop(
         external: further body forces (ops, t, X, xi) -> (n,) over any arithmetic, as those of `underwater_forces`.
         tolerance: the old name of rtol.
         order: 1 where the law commands a velocity, 2 where a force; for laws of one's own, whose names do not say it.
+        events: `lc.Event`s in t, X[i][j] and xi[i], found along one loop on a group that goes by rtol; `run.events`.
+        method: "gauss" takes steps of the length `step` by Gauss collocation of order 6, for conservative motions over very many
+            steps: the energy and the momentum of a free body stay to rounding (1e5 steps: 2e-15, where the default has 3e-5).
         mpc: a controller of `lc.mpc`, instead of group, inertia and law: its loop from t[0] to t[-1], a sample an interval;
             returns its LoopRun, or a tuple of them.
         values: with `mpc` alone, as what follows: states and parameters of the problem, by name.
@@ -265,7 +304,11 @@ def closed_loop(
         group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step, sample=sample,
         delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains, order=order,
     )  # fmt: skip
-    loop, library = loop_library(told.model, told.reference, told.kind)
+    if method not in ("auto", "gauss"):
+        raise InputError(f'closed_loop: method is "auto" or "gauss", given {method!r}')
+    by_rate = told.kind == "continuous" and (told.step is None or method == "gauss")
+    chosen_kind = "adaptive" if by_rate else told.kind
+    loop, library = loop_library(told.model, told.reference, chosen_kind)
     numbers, loops = loop_numbers(loop, told.inertia, gains or {}, told.numbers)
     if told.reference is not None:
         ends = float(told.times[0]), float(told.times[-1])
@@ -278,11 +321,33 @@ def closed_loop(
     start = initial_own(loop, start, {**told.start, **(states or {})})
     stream = noise_stream(loop, _whole(seed, "seed", 0), _whole(first, "first", 0))
     run = Run(loop, library, start, many, told.times, numbers, threads, told.sample or 0.0, told.delay, stream)
+    if method == "gauss":
+        if told.step is None or "loop_rate" not in library.kernels or not loop_system(run).compiled:
+            raise InputError(
+                'closed_loop: method="gauss" is of a law that acts continuously on a group; give it a step'
+            )
+        if events:
+            raise InputError("closed_loop: events go with rtol, not with method='gauss'")
+        return _result(run_in_steps(run, told), told, by_gauss(run, told.parts), told.parts, float("nan"))
+    if events and (told.step is not None or "loop_rate" not in library.kernels or not loop_system(run).compiled):
+        raise InputError(
+            "closed_loop: events are of a law that acts continuously on a group, with rtol; not with step or sample"
+        )
     if told.step is not None:
-        found, count, error = run.states(told.parts), told.parts, float("nan")
-    else:
-        found, count, error = refined(run, told.rtol, _narrower)
+        return _result(run, told, run.states(told.parts), told.parts, float("nan"))
+    if "loop_rate" in library.kernels:
+        if loop_system(run).compiled:
+            found, pair = adaptive(run, told.rtol)
+            hits = loop_events(run, pair, events) if events else ()
+            return _result(run, told, found, 0, pair.error_estimate, pair, hits)
+        run = run_in_steps(run, told)
+    found, count, error = refined(run, told.rtol, _narrower)
     return _result(run, told, found, count, error)
+
+
+def run_in_steps(run: Run, told: LoopArguments) -> Run:
+    """The same loop by equal steps: without a compiler, and as C to take home."""
+    return replace(run, library=loop_library(told.model, told.reference, "continuous")[1])
 
 
 def _whole(value: Any, name: str, default: int) -> int:
@@ -303,7 +368,15 @@ def _narrower(run: Run, loops: Array) -> Run:
     return replace(run, start=np.ascontiguousarray(run.start[loops]), numbers=numbers)
 
 
-def _result(run: Run, told: LoopArguments, found: Array, count: int, error: float) -> ClosedLoop:
+def _result(
+    run: Run,
+    told: LoopArguments,
+    found: Array,
+    count: int,
+    error: float,
+    pair: PairRun | None = None,
+    events: tuple[EventHits, ...] = (),
+) -> ClosedLoop:
     loop, times = run.loop, run.times
     X, xi = loop.plant.split(found)
     states = own_states(loop, found, sampled=bool(run.sample))
@@ -313,12 +386,23 @@ def _result(run: Run, told: LoopArguments, found: Array, count: int, error: floa
     if loop.plant.order == 1 and u is not None:
         xi = u
     gap = run.sample or float(times[1] - times[0])
-    steps = count * round((times[-1] - times[0]) / gap)
+    steps = pair.steps if pair is not None else count * round((times[-1] - times[0]) / gap)
     group = getattr(loop.plant, "group", None)
     shared = {name: value for name, value in states.items() if name not in outputs}
     return ClosedLoop(
-        times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group
-    )._made_by(LoopMaking(run, told.reference, count))
+        times,
+        X,
+        xi,
+        {**outputs, **shared},
+        moves.get("X_d"),
+        moves.get("xi_d"),
+        steps,
+        error,
+        u,
+        states,
+        group,
+        events,
+    )._made_by(LoopMaking(run, told, count, pair))
 
 
 def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:

@@ -13,6 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.curve_reference import CurveReference, curve_kernel
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
 from lie_codegen.control.loop_model import NOISE, Loop, loop_model
+from lie_codegen.control.loop_rate import has_rate, loop_rate, loop_settle
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.budget import shown
@@ -31,6 +32,8 @@ KINDS = {
 
 def loop_library(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Library]:
     """The loop of these arguments of `loop_model`, and its kernels with the reference, compiled.
+
+    The kind is one of `KINDS`, or "adaptive": a rate where the loop has one, else as "continuous".
 
     What follows from definitions is built once a process and known by them; a further force is a Python function, which
     may have changed since, so with it everything is derived again.
@@ -52,7 +55,10 @@ def _defined(loop: Definition, reference: Definition | None, kind: str) -> tuple
 
 def _made(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Library]:
     model = loop_model(**loop)
-    kernels: list[Kernel] = [make(model) for make in KINDS[kind]]
+    adaptive = kind == "adaptive" and has_rate(model)
+    kernels: list[Kernel] = [make(model) for make in KINDS["continuous" if kind == "adaptive" else kind]]
+    if adaptive:
+        kernels = [loop_rate(model, reference), loop_settle(model)]
     kernels += [loop_outputs(model)] if model.law is not None else []
     if reference is not None:
         kernels.append(

@@ -33,6 +33,8 @@ _BLOCK, _PILOT = 64, 16
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 8.0
 _SMALLEST, _MOST_RUNS = 1e-15, 6
+#: Gauss steps in one call.
+_GAUSS_BLOCK = 20_000
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
 
@@ -193,7 +195,7 @@ def _to_tolerance(
         floor = 1e-15 * scale * np.sqrt(fine.steps)
         if estimate <= max(rtol * scale, atol, floor):
             return replace(fine, error_estimate=max(estimate, floor)), local
-        if local[0] <= _SMALLEST:
+        if local[1] <= _SMALLEST:
             break
         needed = estimate / max(rtol * scale, atol)
         if needed > _RATIO**2:  # far off: the next pair starts there
@@ -203,7 +205,7 @@ def _to_tolerance(
             )
         coarse = fine
     raise ComputationError(
-        f"{where}: local errors of {local[0]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
+        f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
     )
 
@@ -245,6 +247,40 @@ def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol:
         raise ComputationError(f"{where}: no step is short enough at t = {given.t:.9g}; is the force smooth there?")
     kept = tuple(np.concatenate([each[j] for each in knots]) for j in range(4)) if one else _no_knots(system)
     return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, float("nan"), *kept)
+
+
+def gauss(system: System, X0: Array, y0: Array, times: Array, parts: int, where: str) -> tuple[Array, Array]:
+    """(k, packed) and (k, size) states of one member by Gauss collocation of order 6, `parts` equal steps between equally spaced times.
+
+    Quadratic invariants of y, as the energy and the momentum of a free body, are kept to rounding over any number of steps; so
+    is the reversibility of the motion within a step. The stages are found by iteration, which asks for steps short beside the
+    fastest rate.
+
+    Raises:
+        ComputationError: a step is too long for the iteration or for the exponential, or a state is no longer finite.
+    """
+    given, _kept = _given(system, 1)
+    X, y = np.array(X0, dtype=float), np.array(y0, dtype=float)
+    k = len(times)
+    X_out, y_out = np.empty((k, system.packed)), np.empty((k, system.size))
+    X_out[0], y_out[0] = X, y
+    work = np.empty(system.size * (_STAGES + 3) + 2 * system.packed + system.group)
+    h = float(times[-1] - times[0]) / ((k - 1) * parts)
+    given.h, given.reach, given.row, given.work = h, system.reach, 1, work.ctypes.data
+    given.X, given.y = X.ctypes.data, y.ctypes.data
+    library = _library()
+    assert_compiled(library)
+    block = max(1, _GAUSS_BLOCK // parts)
+    for first in range(0, k - 1, block):
+        spans = min(block, k - 1 - first)
+        given.t, given.next = float(times[0]) + first * parts * h, 0
+        given.X_out, given.y_out = X_out[first + 1 :].ctypes.data, y_out[first + 1 :].ctypes.data
+        status = library.gauss_run(ctypes.addressof(given), spans, parts)
+        if status == _LOST:
+            raise ComputationError(f"{where}: the state is no longer finite behind t = {given.t:.9g}")
+        if status == _STUCK:
+            raise ComputationError(f"{where}: the step {h:.3g} is too long at t = {given.t:.9g}; take a shorter one")
+    return X_out, y_out
 
 
 def _no_knots(system: System) -> tuple[Array, Array, Array, Array]:
@@ -290,6 +326,7 @@ def _library() -> Any:
         return None
     library, size, pointer = load_library(path), ctypes.c_ssize_t, ctypes.c_void_p
     library.pair_run.restype, library.pair_run.argtypes = size, (pointer, size)
+    library.gauss_run.restype, library.gauss_run.argtypes = size, (pointer, size, size)
     library.pair_within.restype, library.pair_within.argtypes = (
         None,
         (pointer, size, pointer, pointer, pointer, pointer),

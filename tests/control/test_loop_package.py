@@ -58,7 +58,8 @@ def test_the_same_numbers(case: str, tmp_path: Path) -> None:
         assert rows is not None
         last = [float(x) for x in re.sub(r"[(){} ]", "", rows.group(1).splitlines()[-1]).strip(",").split(",")]
         X = run.X[-1] if run.X.ndim == 3 else run.X[-1, 0]
-        np.testing.assert_allclose(last[:9], X.ravel(), rtol=0, atol=1e-15)
+        # A continuous run chooses its steps; its program takes equal ones that are as good, to the tolerance of both.
+        np.testing.assert_allclose(last[:9], X.ravel(), rtol=0, atol=1e-10 if case == "continuous" else 1e-15)
     single = lc.generate(run, tmp_path / "single", name="sat", real="float")
     done = run_in_c(single)
     assert done.returncode == 0, done.stdout

@@ -1,0 +1,109 @@
+"""Continuous loops by the pair 8(5,3): steps as long as the motion allows, errors judged at the times that were asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lie_codegen.arrays import Array
+from lie_codegen.control.loop_model import Loop
+from lie_codegen.control.loop_rate import columns, moves_of
+from lie_codegen.control.loop_run import Run
+from lie_codegen.control.plants import GroupPlant
+from lie_codegen.errors import InputError
+from lie_codegen.flow.events import INNER, Event, EventHits, event_function, find_events
+from lie_codegen.flow.pair853 import PairRun, System, gauss, integrate
+from lie_codegen.flow.product_rate import reach_of
+
+#: The relative part of a tolerance that is absolute: rounding.
+_ROUNDING = 1e-15
+
+
+def loop_system(run: Run) -> System:
+    """The loop as the pair integrates it."""
+    loop, library = run.loop, run.library
+    moves = moves_of(loop)
+    reach = min(reach_of(move.group, closed=move.derivation.matrix_pattern is not None) for move in moves)
+    names = [port.name for port in library.loop_rate.inputs[3:]]
+    turns = sum(move.group.dim for move in moves)
+    return System(library.loop_rate, library.loop_settle, turns, reach, tuple(run.numbers[name] for name in names))
+
+
+def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
+    """(k, N, m) or (k, m) states at the times, and the run.
+
+    Raises:
+        ComputationError: as `integrate`.
+    """
+    system = loop_system(run)
+    elements, vectors = columns(run.loop)
+    start = run.start
+    y0 = np.concatenate([np.zeros((len(start), system.group)), start[:, vectors]], axis=1)
+    found = integrate(
+        system, np.ascontiguousarray(start[:, elements]), y0, run.times, rtol=_ROUNDING, atol=tolerance,
+        where=f"closed_loop({run.loop.plant.namespace})", threads=run.threads,
+    )  # fmt: skip
+    states = joined(run.loop, found.X, found.y)
+    return (states if run.many else states[:, 0]), found
+
+
+def joined(loop: Loop, X: Array, y: Array) -> Array:
+    """(..., m) states of (..., packed) elements and (..., size) vectors behind Theta."""
+    elements, vectors = columns(loop)
+    states = np.empty((*X.shape[:-1], len(elements) + len(vectors)))
+    states[..., elements] = X
+    states[..., vectors] = y[..., y.shape[-1] - len(vectors) :]
+    return states
+
+
+def states_within(run: Run, pair: PairRun, t: Array) -> Array:
+    """(k, m) states of one loop at any times of the run, by fresh steps from the knots before them."""
+    knots = np.clip(np.searchsorted(pair.knot_t, t, side="right") - 1, 0, len(pair.knot_t) - 1)
+    X, y = pair.within(loop_system(run), knots, (t - pair.knot_t[knots]) / pair.knot_h[knots])
+    return joined(run.loop, X, y)
+
+
+def loop_events(run: Run, pair: PairRun, events: Sequence[Event]) -> tuple[EventHits, ...]:
+    """What is found of the events along one loop: sign changes between steps and at two places within each.
+
+    Raises:
+        InputError, ExpressionError: as `find_events`.
+    """
+    plant = run.loop.plant
+    where = f"closed_loop({plant.namespace})"
+    if run.many:
+        raise InputError(f"{where}: events are of one loop; run it alone")
+    if not isinstance(plant, GroupPlant):
+        raise InputError(f"{where}: events are of loops on groups")
+    group = plant.group
+    functions = [event_function(each, group.degree, group.is_complex, plant.sizes[1]) for each in events]
+    system = loop_system(run)
+
+    def inside(step: NDArray[np.intp], part: Array) -> tuple[Array, Array | None]:
+        X, y = pair.within(system, step, part)
+        return plant.split(joined(run.loop, X, y))
+
+    count = len(pair.knot_t)
+    parts = np.concatenate([[0.0], INNER])
+    step = np.repeat(np.arange(count), len(parts))
+    X, xi = inside(np.append(step, count - 1), np.append(np.tile(parts, count), 1.0))
+    return find_events(events, functions, pair.knot_t, pair.knot_h, (X, xi), inside, where)
+
+
+def by_gauss(run: Run, parts: int) -> Array:
+    """(k, N, m) or (k, m) states by Gauss collocation of order 6, `parts` equal steps between two times, one loop after another.
+
+    Raises:
+        ComputationError: as `gauss`.
+    """
+    whole, (elements, vectors) = loop_system(run), columns(run.loop)
+    found = []
+    for k, state in enumerate(run.start):
+        system = whole.of_members(k)
+        y0 = np.concatenate([np.zeros(system.group), state[vectors]])
+        X, y = gauss(system, state[elements], y0, run.times, parts, f"closed_loop({run.loop.plant.namespace})")
+        found.append(joined(run.loop, X, y))
+    states = np.stack(found, axis=1)
+    return states if run.many else states[:, 0]
