@@ -7,7 +7,7 @@ for the loop as Theorem 4.2 has it: the force of the law itself, all the time, o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from scipy.linalg import eigh
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.certificate_constants import Metric, hessian_bound, quadratic_bounds
+from lie_codegen.control.certificate_proofs import UNPROVED, proved_constants, status_of
 from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNumbers, overshoot_of
 from lie_codegen.control.claims import check_constant, is_claimed
 from lie_codegen.control.compatibility import check_compatibility
@@ -25,12 +26,11 @@ from lie_codegen.control.descent import comes_home
 from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples
-from lie_codegen.control.interval_proof import proved_hessian, proved_ratio, proved_transport
 from lie_codegen.control.invariance import invariance
 from lie_codegen.control.level_search import LevelSearch
 from lie_codegen.control.tracking_law import FEEDFORWARDS
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, positive_matrix
+from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -38,9 +38,6 @@ from lie_codegen.kernel.definition import made_from
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 
-#: How far beyond the sampled value a bound is tried to be proved, in turn.
-_INFLATED = (1.01, 1.05)
-_UNPROVED = (float("nan"),) * 4
 _LAW = "lie_codegen.control.tracking_law:tracking_law"
 
 
@@ -255,7 +252,7 @@ def certificate(
     else:
         best = Rate(float(epsilon), pointwise.at(float(epsilon), starts=6), overshoot_of(float(epsilon), b_2))
     stated = theorem.best(overshoot) if feedforward == "levi_civita" else Rate(float("nan"), float("nan"), float("nan"))
-    proved = _proved(pair, gains, metric, level, (b_1, b_2, h, t)) if prove else _UNPROVED
+    proved = proved_constants(pair, gains, metric, level, (b_1, b_2, h, t)) if prove else UNPROVED
     sure = float("nan")
     if feedforward == "levi_civita" and np.all(np.isfinite(proved)):
         sure = replace(theorem, b_1=proved[0], b_2=proved[1], h=proved[2], t=proved[3]).best(overshoot).rate
@@ -266,7 +263,7 @@ def certificate(
         pair, body, K_d, feedforward, float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component), level,
         float(speed), bound, b_1, b_2, proved[0], proved[1], h, proved[2], t, proved[3], best.epsilon, best.rate, best.k, stated.epsilon,
         stated.rate, sure, stated.k, theorem.P(stated.epsilon), theorem.P(stated.epsilon, -1.0), theorem.Q(stated.epsilon),
-        float(-2 * np.max(slowest.real)), points, _status(pair, points, proved, len(search.places.X)),
+        float(-2 * np.max(slowest.real)), points, status_of(pair, points, proved, len(search.places.X)),
     )  # fmt: skip
 
 
@@ -302,45 +299,3 @@ def _level(level: float | None, L: float, pair: ErrorFunction) -> float:
     if not 0 < value < L:
         raise InputError(f"certificate: level = {value:g} must lie between 0 and L = {L:g}: at L b_1 is infinite")
     return value
-
-
-def _proved(
-    pair: ErrorFunction,
-    gains: Mapping[str, Any],
-    metric: Metric,
-    level: float,
-    found: tuple[float, float, float, float],
-) -> tuple[float, float, float, float]:
-    """Bounds of b_1, b_2, h and t near the sampled ones, each proved; NaN where none is."""
-    if pair.name != "so3_right" or is_claimed(pair):
-        return _UNPROVED
-    definition = getattr(pair, "definition", None)
-    given = definition["parameters"]["gains"] if definition is not None else gains
-    K, I = as_floats(attitude_gain(gain(given, "K_p", "the error function so3_right"), 3, "K_p")), metric.I  # noqa: E741
-    b_1, b_2, h, t = found
-    claims: tuple[tuple[float, Callable[[float], bool]], ...] = (
-        (b_1, lambda f: proved_ratio(K, I, level, f * b_1, upper=True)),
-        (1 / b_2, lambda f: proved_ratio(K, I, level, b_2 / f, upper=False)),
-        (h, lambda f: proved_hessian(K, I, metric.nabla, level, f * h)),
-        (t, lambda f: proved_transport(I, metric.nabla, f * t)),
-    )
-    above, below, hessian, transport = (
-        next((f * value for f in _INFLATED if holds(f)), float("nan")) for value, holds in claims
-    )
-    return above, 1 / below, hessian, transport
-
-
-def _status(pair: ErrorFunction, points: CriticalPoints, proved: tuple[float, ...], count: int) -> str:
-    if pair.uses_log:
-        known = "up to the cut locus, L the least of phi there"
-    elif not is_claimed(pair) and pair.constant is not None:
-        known = "L known"
-    else:
-        known = f"L from critical points ({points.status})"
-    sure = [
-        f"{name} {'>=' if name == 'b_2' else '<='} {value:.6g}"
-        for name, value in zip(("b_1", "b_2", "h", "t"), proved, strict=True)
-        if np.isfinite(value)
-    ]
-    bounds = f"{', '.join(sure)} proved in interval arithmetic" if sure else "b_1, b_2, h and t sampled"
-    return f"{known}; {bounds}; rate sampled ({count} places and their refinement)"
