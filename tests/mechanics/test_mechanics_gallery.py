@@ -66,6 +66,9 @@ def test_dumbbell_tells_what_reproduces(tmp_path):
     calm = numbers["pd_and_sin_alone"]
     assert 0.75 < calm["rho_amplitude_last_tenth"] / calm["rho_amplitude_first_tenth"] < 0.9
     assert calm["theta_amplitude_last_tenth"] == pytest.approx(0.395, abs=0.02)
+    for when in ("first", "last"):
+        name = f"rho_amplitude_{when}_tenth"
+        assert numbers["pd_and_sin_alone_variational"][name] == pytest.approx(calm[name], rel=0.05)
     corrected = numbers["corrected_design"]
     assert corrected["orbit_damping_with"] > 50 * corrected["orbit_damping_without"]
     assert corrected["rho_amplitude_last_orbit_with"] < 1e-6 < corrected["rho_amplitude_last_orbit_without"]
