@@ -22,7 +22,7 @@ from lie_codegen.control.loop_library import loop_library, loop_numbers, several
 from lie_codegen.control.loop_package import loop_parts
 from lie_codegen.control.loop_run import Run, noise_stream, refined
 from lie_codegen.control.loop_states import initial_own, own_states
-from lie_codegen.control.reference_check import check_reference
+from lie_codegen.control.reference_check import check_once
 from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import shown
 from lie_codegen.flow.events import Event, EventHits
@@ -228,7 +228,7 @@ def closed_loop(
             one a loop: then it is an input of one compiled step. A law that commands the velocity needs none.
         gains: values of the law's numbers that are inputs (`k_p="input"`): name -> a number, or one a loop, (N, *shape). A
             law's `inertia` is that of the body unless it is given here.
-        reference: what `lc.reference` makes or takes: a reference, a plan, formulas of t. An attitude law follows it by its
+        reference: what `lc.reference` makes or takes: a reference, a plan, formulas of t; or one element, to rest at. An attitude law follows it by its
             `tracking` form; any other law that gives a velocity and reads no reference is given X_d^-1 X, and the reference's
             velocity is added to its command.
         X0: (d, d) or (N, d, d) initial configurations, the identity if not given.
@@ -315,7 +315,7 @@ def closed_loop(
         if isinstance(told.reference, CurveReference):
             check_curve(told.reference, *ends, library.reference.batch)
         else:
-            check_reference(told.reference, *ends, library.reference)
+            check_once(told.reference, *ends, library.reference)
     start, many = loop.plant.starts(X0, xi0)
     start, many = several(start, many, loops, runs)
     start = initial_own(loop, start, {**told.start, **(states or {})})

@@ -14,20 +14,18 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.curve_reference import CurveReference, curve_reference
 from lie_codegen.control.loop_model import NOISE
 from lie_codegen.control.loop_ports import LoopLaw, moving_law, read_law
+from lie_codegen.control.loop_times import error_goal, is_number, read_times, sampling
 from lie_codegen.control.plants import GroupPlant, Plant, group_plant
 from lie_codegen.control.reference_kernels import reference as make_reference
 from lie_codegen.control.space_plants import named_plant, vibrated
-from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import shown
 from lie_codegen.groups.catalogue_load import as_group
+from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import plain
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
-
-_RTOL = 1e-10
-#: Relative distance from a whole number of samples or steps that is rounding.
-_WHOLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ def loop_arguments(
     """
     if gains is not None and not isinstance(gains, Mapping):
         raise InputError(f"closed_loop: gains is a mapping such as {{'k_p': 4}}, got {shown(gains)}")
-    times = _times(t)
+    times = read_times(t)
     designed = None
     if isinstance(law, VibrationalFeedback):
         designed, law, period = vibrated(law)
@@ -116,10 +114,10 @@ def loop_arguments(
             raise InputError("closed_loop: give a function as disturbance or as external, not both")
         disturbance, external = None, disturbance
     formulas = _disturbance(disturbance, numbers)
-    told = _sampling(times, step, sample, delay, (*kinds, *(["bias"] if biased else [])), watching)
+    told = sampling(times, step, sample, delay, (*kinds, *(["bias"] if biased else [])), watching)
     if read is None and (told[0] is not None or limits is not None or watching is not None):
         raise InputError("closed_loop: sample, delay, noise, limits and observer are of a law: give law=")
-    goal = _tolerance(rtol, tolerance, step)
+    goal = error_goal(rtol, tolerance, step)
     seconds, late = told
     parts = 1
     if step is not None:
@@ -143,19 +141,6 @@ def loop_arguments(
     return LoopArguments(model, kind, moves, times, inertia, numbers, start, seconds, late, step, parts, goal)
 
 
-def _times(t: ArrayLike) -> Array:
-    try:
-        times = np.asarray(t, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"closed_loop: t must be an array of numbers, got {shown(t)}") from None
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)):
-        raise ShapeError(f"closed_loop: t has shape {times.shape}; give at least two finite times")
-    gaps = np.diff(times)
-    if gaps[0] <= 0 or np.max(np.abs(gaps - gaps[0])) > 1e-9 * abs(gaps[0]) * len(times):
-        raise InputError("closed_loop: t must increase in equal steps, as numpy.linspace gives them")
-    return times
-
-
 def _ordered(law: LoopLaw | None, order: int | None) -> LoopLaw | None:
     """The law with the order that was told, where its ports do not say it.
 
@@ -165,7 +150,7 @@ def _ordered(law: LoopLaw | None, order: int | None) -> LoopLaw | None:
     if order is None or law is None:
         return law
     if order not in (1, 2) or isinstance(order, bool):
-        raise InputError(f"closed_loop: order is 1 (the command is a velocity) or 2 (a force), got {order!r:.60}")
+        raise InputError(f"closed_loop: order is 1 (the command is a velocity) or 2 (a force), got {shown(order)}")
     if law.order not in (None, order):
         meant = "a velocity" if law.order == 1 else "a force"
         raise InputError(f"closed_loop: order = {order}, and the law {law.kernel.name} commands {meant}")
@@ -192,7 +177,7 @@ def _plant(group: Any, law: LoopLaw | None, inertia: Any) -> Plant:
     if law.order is None:
         raise InputError(
             f"closed_loop: is {law.command.name} of the law {law.kernel.name} a velocity or a force? Name it omega or velocity, "
-            "force or torque; or give inertia= of the body that it pushes"
+            "force or torque; or give order=, or inertia= of the body that it pushes"
         )
     return group_plant(group, order=1)
 
@@ -214,6 +199,10 @@ def _reference(plant: Plant, reference: Any) -> Any:
                 f"closed_loop: the reference has {len(curve.r)} coordinates, {plant.namespace} {plant.ports[0].shape[0]}"
             )
         return curve
+    if np.shape(reference) == (group.degree, group.degree) and not isinstance(np.asarray(reference).flat[0], str):
+        return make_reference(
+            group, [0] * group.dim, start=admitted(group, np.asarray(reference), "closed_loop: reference").X
+        )
     theirs = getattr(reference, "group", None)
     made = hasattr(reference, "definition") or not (
         isinstance(reference, list | tuple) or all(hasattr(reference, name) for name in ("X", "u", "duration"))
@@ -285,9 +274,7 @@ def _disturbance(disturbance: Any, numbers: dict[str, Any]) -> Any:
         return disturbance
     if isinstance(disturbance, str):
         raise InputError(f"closed_loop: disturbance is one formula a component, got the text {shown(disturbance)}")
-    listed = isinstance(disturbance, Sequence) and all(
-        isinstance(each, str) or _is_number(each) for each in disturbance
-    )
+    listed = isinstance(disturbance, Sequence) and all(isinstance(each, str) or is_number(each) for each in disturbance)
     if listed and any(isinstance(each, str) for each in disturbance):
         return tuple(each if isinstance(each, str) else float(each) for each in disturbance)
     try:
@@ -297,68 +284,3 @@ def _disturbance(disturbance: Any, numbers: dict[str, Any]) -> Any:
             f"closed_loop: disturbance is formulas of t, X and xi, one a component, constants, or a Kernel; got {shown(disturbance)}"
         ) from None
     return "input"
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
-
-
-def _sampling(
-    times: Array,
-    step: float | None,
-    sample: float | None,
-    delay: float | None,
-    noise: Sequence[str],
-    observer: LoopLaw | None,
-) -> tuple[float | None, int]:
-    """Seconds between two calls of the law, None for a continuous one, and the delay in samples."""
-    for name, value in (("step", step), ("sample", sample)):
-        if value is not None and not (_is_number(value) and np.isfinite(value) and value > 0):
-            raise InputError(f"closed_loop: {name} is a positive number of seconds, got {shown(value)}")
-    asked = [f"noise on {', '.join(noise)}"] if noise else []
-    asked += ["a delay"] if delay else []
-    asked += ["an observer"] if observer is not None else []
-    if sample is None:
-        if not asked:
-            return None, 0
-        if step is None:
-            raise InputError(
-                f"closed_loop: {' and '.join(asked)} needs sample=, the seconds from one call of the law to the next"
-            )
-        sample = step
-    gap = float(times[1] - times[0])
-    count = round(gap / sample)
-    if count < 1 or abs(gap / sample - count) > _WHOLE * count:
-        raise InputError(
-            f"closed_loop: the times t are {gap:g} s apart, which is no multiple of sample = {sample:g}; choose t so that it is"
-        )
-    sample = gap / count
-    if delay is None:
-        return sample, 0
-    if not _is_number(delay) or not np.isfinite(delay) or delay < 0:
-        raise InputError(
-            f"closed_loop: delay is a number of samples (an int) or of seconds (a float), got {shown(delay)}"
-        )
-    if isinstance(delay, int | np.integer):
-        return sample, int(delay)
-    late = round(float(delay) / sample)
-    if abs(float(delay) / sample - late) > _WHOLE * max(1, late):
-        raise InputError(f"closed_loop: delay = {delay:g} s is no multiple of sample = {sample:g} s")
-    return sample, late
-
-
-def _tolerance(rtol: float | None, tolerance: float | None, step: float | None) -> float:
-    if rtol is not None and tolerance is not None:
-        raise InputError("closed_loop: give rtol, or its old name tolerance, not both")
-    name, value = ("rtol", rtol) if rtol is not None else ("tolerance", tolerance)
-    if value is not None and step is not None:
-        raise InputError(f"closed_loop: step = {step:g} and {name}: give the step or the tolerance, not both")
-    if value is None:
-        return _RTOL
-    if not _is_number(value):
-        raise InputError(f"closed_loop: {name} is a positive number, got {shown(value)}")
-    if not np.isfinite(value):
-        raise NotFiniteError(f"closed_loop: {name} is {value}; give a positive number")
-    if value <= 0:
-        raise InputError(f"closed_loop: {name} must be positive, got {shown(value)}")
-    return float(value)

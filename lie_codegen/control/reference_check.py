@@ -19,6 +19,28 @@ from lie_codegen.kernel.complex_scalar import Complex
 _JUMP_WIDTH, _JUMP_SIZE = 1e-9, 1e-5
 
 
+#: References that were found smooth, with their times; a repeated loop does not look again.
+_SMOOTH: dict[tuple[Any, float, float], None] = {}
+_MOST = 256
+
+
+def check_once(reference: Reference, t0: float, t1: float, evaluate: Callable[[float], Any]) -> None:
+    """`check_reference`, of one that says by its definition what it is once a process.
+
+    Raises:
+        InputError: as `check_reference`.
+    """
+    definition = getattr(reference, "definition", None)
+    key = (definition, t0, t1)
+    if definition is not None and key in _SMOOTH:
+        return
+    check_reference(reference, t0, t1, evaluate)
+    if definition is not None:
+        if len(_SMOOTH) >= _MOST:
+            _SMOOTH.clear()
+        _SMOOTH[key] = None
+
+
 def check_reference(
     reference: Reference, t0: float, t1: float, evaluate: Callable[[float], Any] | None = None, samples: int = 400
 ) -> None:

@@ -192,3 +192,28 @@ def test_a_law_with_states_of_every_kind_continuous() -> None:
     np.testing.assert_allclose(run.X, want[:, :9].reshape(-1, 3, 3), atol=1e-8)
     np.testing.assert_allclose(run.states["z"], want[:, 12:15], atol=1e-8)
     np.testing.assert_allclose(run.states["X_hat"], want[:, 15:].reshape(-1, 3, 3), atol=1e-8)
+
+
+def test_an_element_is_a_reference_at_rest_and_the_order_may_be_said() -> None:
+    law = lc.attitude_law("pd", inertia=J, k_p=2, k_d=3)
+    here = Rotation.from_rotvec([0.2, -0.1, 0.5]).as_matrix()
+    run = lc.closed_loop("so3", inertia=J, law=law, reference=here, X0=here @ START, t=T)
+    same = lc.closed_loop("so3", inertia=J, law=law, X0=START, t=T)
+    np.testing.assert_allclose(run.X, here @ same.X, atol=1e-9)
+    np.testing.assert_allclose(run.error, same.error, atol=1e-9)
+
+    def body(ops: Any, X: Any) -> Any:
+        return ([X[1][2] - X[2][1], X[2][0] - X[0][2], X[0][1] - X[1][0]],)
+
+    silent = lc.Kernel("silent", "so3", (lc.Port("X", (3, 3)),), (lc.Port("command", (3,)),), body)
+    with pytest.raises(InputError, match="a velocity or a force"):
+        lc.closed_loop("so3", law=silent, X0=START, t=T)
+    first = lc.closed_loop("so3", law=silent, X0=START, t=T, order=1)
+    np.testing.assert_allclose(
+        first.X, lc.simulate("so3", ["X23 - X32", "X31 - X13", "X12 - X21"], X0=START, t=T).X, atol=1e-9
+    )
+    assert lc.closed_loop("so3", law=silent, inertia=J, X0=START, t=T, order=2).group is not None
+    with pytest.raises(InputError, match="order = 1, and the law attitude_pd"):
+        lc.closed_loop("so3", inertia=J, law=law, t=T, order=1)
+    with pytest.raises(InputError, match="order is 1"):
+        lc.closed_loop("so3", inertia=J, law=law, t=T, order=3)
