@@ -173,6 +173,8 @@ from .pictures import plot_plan as plot_plan
 from .pictures import view as view
 
 # rigid_body
+from .rigid_body import coning_angles as coning_angles
+from .rigid_body import coning_bounds as coning_bounds
 from .rigid_body import elliptic_kernels as elliptic_kernels
 from .rigid_body import euler_average as euler_average
 from .rigid_body import euler_perturbation as euler_perturbation
@@ -182,6 +184,7 @@ from .rigid_body import free_rotation as free_rotation
 from .rigid_body import inertia_from_masses as inertia_from_masses
 from .rigid_body import limit_cycle_gains as limit_cycle_gains
 from .rigid_body import limit_cycles as limit_cycles
+from .rigid_body import modulus_squared as modulus_squared
 from .rigid_body import momentum_directions as momentum_directions
 from .rigid_body import moving_parts as moving_parts
 from .rigid_body import plates as plates

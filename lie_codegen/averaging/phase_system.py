@@ -135,8 +135,8 @@ class PhaseAverage(Saved):
     def solve(
         self, x0: ArrayLike, phi0: float, t: ArrayLike, eps: float, *, order: int | None = None, start: str = "mean",
         rtol: float = 1e-12,
-    ) -> PhaseSolution | list[PhaseSolution]:  # fmt: skip
-        """The solution through the osculating (x0, phi0) at t[0].
+    ) -> Any:  # fmt: skip
+        """The solution through the osculating (x0, phi0) at t[0]: a PhaseSolution, or a list of them for a batch of starts.
 
         Args:
             x0: (n,), or (B, n) for a list of solutions.

@@ -108,10 +108,8 @@ class TimeAverage(Saved):
         z, _, status = to_mean(maps, self._point(y), 0.0, eps)
         return z, status
 
-    def solve(
-        self, y0: ArrayLike, t: ArrayLike, eps: float, *, start: str = "mean", rtol: float = 1e-12
-    ) -> TimeSolution | list[TimeSolution]:
-        """The solution through y0 at t[0].
+    def solve(self, y0: ArrayLike, t: ArrayLike, eps: float, *, start: str = "mean", rtol: float = 1e-12) -> Any:
+        """The solution through y0 at t[0]: a TimeSolution, or a list of them for a batch of starts.
 
         Args:
             y0: (n,), or (B, n) for a list of solutions.

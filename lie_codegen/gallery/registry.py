@@ -78,6 +78,8 @@ TARGETS = (
     Target("rigid_body_boom", "rigid_body_boom", "Coppola, Figure 1: boom deployment, actual, averaged and algebraic"),
     Target("rigid_body_thruster", "rigid_body_thruster", "Coppola, Figure 2: a thruster on a tumbling body"),
     Target("rigid_body_limit_cycle", "rigid_body_limit_cycle", "Coppola, Figure 3: limit cycle by linear feedback"),
+    Target("tumbling_debris", "tumbling_debris", "a debris object under sunlight for sixty days, averaged and direct"),
+    Target("tumbling_separatrix", "tumbling_debris", "a body despun through its separatrix: event and continuations"),
     Target("rigid_body_cost", "rigid_body_cost", "cost and error of averaging over 1/eps; elliptic kernels and SciPy"),
     Target("vibrational_kapitza", "vibrational_kapitza", "Kapitza's pendulum: average, threshold, a tilt held in C"),
     Target("vibrational_examples", "vibrational_examples", "cart and two-link arm, actual against averaged, orders"),

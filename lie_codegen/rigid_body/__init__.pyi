@@ -1,5 +1,8 @@
 """The free and the tumbling rigid body: elliptic functions, Euler averages."""
 
+from .coning import coning_angles as coning_angles
+from .coning import coning_bounds as coning_bounds
+from .coning import modulus_squared as modulus_squared
 from .elliptic_kernels import elliptic_kernels as elliptic_kernels
 from .euler_average import euler_average as euler_average
 from .euler_equilibria import limit_cycle_gains as limit_cycle_gains

@@ -164,8 +164,10 @@ class EulerAverage(Value):
 
     def solve(
         self, omega0: ArrayLike, t: ArrayLike, eps: float, *, order: int = 2, start: str = "mean", rtol: float = 1e-12
-    ) -> EulerSolution | list[EulerSolution]:
+    ) -> Any:
         """The motion from omega0 at t[0] by averaging, mean and osculating; what was computed before an event is returned.
+
+        An EulerSolution, or a list of them for a batch of starts.
 
         Over times of order 1/eps: Omega and k to O(eps^2) with order 2, to O(eps) with order 1; phi to O(eps) with order 2,
         to no order with order 1 (F3 would be needed for more, as phi integrates Lambda along the slow error).

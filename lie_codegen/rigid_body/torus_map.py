@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from math import gcd
 from typing import Any
 
 import numpy as np
@@ -62,8 +64,10 @@ def torus_series(sample: Callable[[Array, Array], tuple[Array, Array]], rate: fl
     return TorusSeries(waves, rate, m, float(np.linalg.norm(torque, axis=-1).max()))
 
 
-def resonant_ratios() -> list[tuple[int, int]]:
+@cache
+def resonant_ratios() -> tuple[tuple[int, int], ...]:
     """Coprime (n1, n2), n2 > 0, n1 of either sign."""
     most1, most2 = LARGEST
     signed = range(-most1, most1 + 1)
-    return [(n1, n2) for n2 in range(1, most2 + 1) for n1 in signed if n1 and np.gcd(abs(n1), n2) == 1]
+    pairs = ((n1, n2) for n2 in range(1, most2 + 1) for n1 in signed)
+    return tuple((n1, n2) for n1, n2 in pairs if n1 and gcd(n1, n2) == 1)

@@ -28,7 +28,6 @@ from lie_codegen.rigid_body.torques import Torque, cross, plate_force
 
 NAMESPACE = "tumbling"
 _TURNS, _TURNS_OF_FORMULAS = 8, 32
-_GAUSS = np.polynomial.legendre.leggauss(8)
 #: k of the separatrix event.
 MARGIN = 0.999
 _BODY = (Port("paper", (3, 3), "1", description="axes of the formulas by columns, in the user's axes"),
@@ -107,10 +106,7 @@ def average_routine(model: TorqueModel, namespace: str) -> Routine:
         N = apply(inward, model.smooth(ops, multiply(X, inward), apply(paper, w), e))
         return N, apply(X, N)
 
-    def plate(ops: Arithmetic, b: Any, n: Any, r: Any, numbers: Any) -> tuple[Any, ...]:
-        return (plate_force(ops, b, n, r, numbers, n[0] * b[0] + n[1] * b[1] + n[2] * b[2]),)
-
-    names = {each: f"{namespace}_{each}" for each in ("start", "node", "smooth", "plate")}
+    names = {each: f"{namespace}_{each}" for each in ("start", "node", "smooth")}
     helpers = [
         Kernel("start", namespace, (H, D, inertia),
                (Port("C", (3, 3)), Port("L", ()), r, k, Port("rate", ()), Port("c", ())), _start),
@@ -127,15 +123,10 @@ def average_routine(model: TorqueModel, namespace: str) -> Routine:
             )
         )
     plates = model.plates()
-    if plates:
-        vectors = tuple(Port(name, (3,)) for name in ("b", "n", "r", "numbers"))
-        helpers.append(Kernel("plate", namespace, vectors, (N,), plate))
     views = [{"numbers": [repr(v) for v in numbers], "place": place} for numbers, place in plates]
-    points, weights = ([repr(float(v)) for v in part] for part in _GAUSS)
     settings = (
-        ("key", model.key), ("environment", model.size), ("plates", Frozen(views)), ("points", Frozen(points)),
-        ("weights", Frozen(weights)), ("turns", model.turns), ("start", names["start"]), ("node", names["node"]),
-        ("smooth", names["smooth"] if model.has_smooth else ""), ("plate", names["plate"]),
+        ("key", model.key), ("environment", model.size), ("plates", Frozen(views)), ("turns", model.turns), ("start", names["start"]), ("node", names["node"]),
+        ("smooth", names["smooth"] if model.has_smooth else ""),
     )  # fmt: skip
 
     def twin(values: Sequence[float]) -> Array:
@@ -170,19 +161,20 @@ def _node(ops: Arithmetic, r: Any, k: Any, phi: Any) -> tuple[Any, ...]:
 
 
 def _twin(model: TorqueModel, values: Array) -> Array:
-    """The averages by Python, plates by Gauss points on their lit arcs too."""
+    """The averages by Python."""
     ops: Any = FloatArithmetic()
     H, D, e = values[:3].tolist(), float(values[3]), values[4 : 4 + model.size].tolist()
     paper, inertia = values[4 + model.size : 13 + model.size].reshape(3, 3), values[13 + model.size : 16 + model.size]
     C, L, r, k, rate, c = _start(ops, H, D, inertia.tolist())
-    count = int(values[-1]) or (32 if k < 0.95 else 64 if k < 0.999 else 96)
+    least = 32 if model.has_smooth or k >= 0.7 else 16 if k >= 0.2 else 8
+    count = int(values[-1]) or (least if k < 0.95 else 64 if k < 0.999 else 96)
     total, inward = np.zeros(5), paper.T
     weights = 2 * (inertia - inertia[2])
     for j in range(count):
         direction, A = (np.array(each) for each in _node(ops, r, k, j / count))
         w = L * direction / inertia
 
-        def add(alpha: float, N: Array, weight: float, A: Array = A, w: Array = w) -> None:
+        def add(alpha: float, N: Array, weight: float, A: Array = A, w: Array = w, total: Array = total) -> None:
             X = np.array(C) @ np.array(about_third(ops, alpha, A.tolist()))
             total[:] += weight / count * np.concatenate([X @ N, [weights @ (w * N), w @ N]])
 
@@ -193,19 +185,35 @@ def _twin(model: TorqueModel, values: Array) -> Array:
                 N = inward @ np.array(model.smooth(ops, X.tolist(), (paper @ w).tolist(), e))
                 add(alpha, N, 1 / model.turns)
         for numbers, place in model.plates():
-            n, centre, d = inward @ numbers[:3], inward @ numbers[3:6], np.array(C).T @ e[place : place + 3]
-            v = A @ n
-            level, wave = v[2] * d[2], complex(v[0] * d[0] + v[1] * d[1], v[0] * d[1] - v[1] * d[0])
-            if level <= -abs(wave):
-                continue
-            full = level >= abs(wave)
-            half = np.pi if full else np.arccos(-level / abs(wave))
-            for i in range(8):
-                alpha = np.pi / 4 * i if full else np.angle(wave) + half * _GAUSS[0][i]
-                b = np.array(about_third(ops, alpha, A.tolist())).T @ d
-                N = np.array(plate_force(ops, b.tolist(), n.tolist(), centre.tolist(), numbers[6:], float(n @ b)))
-                add(alpha, N, 0.125 if full else half * _GAUSS[1][i] / (2 * np.pi))
+            n, centre, d = A @ inward @ numbers[:3], A @ inward @ numbers[3:6], np.array(C).T @ e[place : place + 3]
+            first, second = _lit_means(n[2] * d[2], complex(n[0] * d[0] + n[1] * d[1], n[0] * d[1] - n[1] * d[0]))
+            pressure, specular, diffuse = numbers[6:]
+            arm, push, drive = np.cross(centre, n), A @ w, A @ (weights * w)
+            moved = (1 - specular) * np.cross(first @ centre, d) + (
+                2 * specular * second + 2 / 3 * diffuse * first
+            ) @ arm
+            straight = 2 * specular * second[2, 2] + 2 / 3 * diffuse * first[2, 2]
+            powers = [(1 - specular) * d @ first @ np.cross(v, centre) + straight * v @ arm for v in (drive, push)]
+            total -= pressure / count * np.concatenate([np.array(C) @ moved, powers])
     return np.concatenate([total, [k, rate, L, r[2], c]])
+
+
+def _lit_means(level: float, wave: complex) -> tuple[Array, Array]:
+    """Means of u Rz(alpha) and u^2 Rz(alpha), u = max(0, level + Re(wave exp(-i alpha))), over alpha."""
+    size = abs(wave)
+    if not level > -size:
+        return np.zeros((3, 3)), np.zeros((3, 3))
+    half = np.pi if level >= size else float(np.arccos(-level / size))
+    s, mixed = (0.0, 0.0) if level >= size else (float(np.sin(half)), float(np.sin(half) * np.cos(half)) / 2)
+    middle = wave / size if size > 0 else 1.0
+    even = half / 2 + mixed
+    plain = (level * half + size * s, level**2 * half + 2 * level * size * s + size**2 * even)
+    waved = (level * s + size * even, level**2 * s + 2 * level * size * even + size**2 * (s - s**3 / 3))
+    found = []
+    for m, v in zip(plain, waved, strict=True):
+        z = v * middle / np.pi
+        found.append(np.array([[z.real, -z.imag, 0], [z.imag, z.real, 0], [0, 0, m / np.pi]]))
+    return found[0], found[1]
 
 
 def tumbling_kernels(J: Array, torques: Sequence[Torque], namespace: str = NAMESPACE) -> tuple[Kernel, ...]:
@@ -218,14 +226,17 @@ def tumbling_kernels(J: Array, torques: Sequence[Torque], namespace: str = NAMES
     given = (Port("given", (3 * len(model.functions),), description="directions at t"),) if model.functions else ()
     y = Port("y", (6,), description="H [N m s], D [(N m s)^2], phi, alpha hat [rad]")
     time, nodes = Port("t", (), "s"), Port("nodes", (), description="phases; 0: by k")
+    carry = Port("carry", (), description="1: alpha hat is carried along, 0: its rate is left 0, which is faster")
     H, D = Port("H", (3,), "N m s"), Port("D", (), "(N m s)^2", description="H.H - 2 I3 T")
 
-    def slow_rate(ops: Arithmetic, y: Any, t: Any, paper: Any, inertia: Any, nodes: Any, *rest: Any) -> tuple[Any, ...]:
+    def slow_rate(
+        ops: Arithmetic, y: Any, t: Any, paper: Any, inertia: Any, nodes: Any, carry: Any, *rest: Any
+    ) -> tuple[Any, ...]:
         e = model.environment(ops, t, rest[0] if rest else ())
         flat = [entry for row in paper for entry in row]
         found = call_routine(ops, routine, [*y[:4], *e, *flat, *inertia, nodes])
         k, rate, L, r3, c = found[5:]
-        mean = call_routine(ops, precession, [k, r3, c])[0]
+        mean = call_routine(ops, precession, [k, r3, c], ops.less(ops.constant(0), carry))[0]
         return [*found[:4], rate, L / inertia[2] * mean], found[4]
 
     def shape(ops: Arithmetic, H: Any, D: Any, inertia: Any) -> tuple[Any, ...]:
@@ -269,7 +280,7 @@ def tumbling_kernels(J: Array, torques: Sequence[Torque], namespace: str = NAMES
     z = Port("z", (7,), description="quaternion (scalar first), omega [rad/s]")
     source = "Benson and Scheeres, J. Guidance Control Dynamics 44 (2021)"
     return (
-        Kernel("slow_rate", namespace, (y, time, *_BODY, nodes, *given), (Port("y_dot", (6,)), Port("power", (), "W")), slow_rate,
+        Kernel("slow_rate", namespace, (y, time, *_BODY, nodes, carry, *given), (Port("y_dot", (6,)), Port("power", (), "W")), slow_rate,
                "H' = <X N>, D' = 2 <sum (I_n - I3) w_n N_n>, phi' = Lambda, alpha hat' = m", source, _slow_sample(J, model)),
         Kernel("shape", namespace, (H, D, _BODY[1]), (Port("k", ()), Port("Lambda", (), "1/s"), Port("m", (), "rad/s"), Port("b", (TERMS,))),
                shape, "modulus, rate of the phase, mean precession and its series", source, lambda rng: _shape_sample(J, rng)),
@@ -329,7 +340,7 @@ def _unit(rng: random.Random, model: TorqueModel) -> tuple[Any, ...]:
 def _slow_sample(J: Array, model: TorqueModel) -> Any:
     def sample(rng: random.Random) -> tuple[Any, ...]:
         y, inertia = _y_sample(J, rng)
-        return y, rng.uniform(0, 1), np.eye(3).tolist(), inertia, 0.0, *_unit(rng, model)
+        return y, rng.uniform(0, 1), np.eye(3).tolist(), inertia, 0.0, 1.0, *_unit(rng, model)
 
     return sample
 

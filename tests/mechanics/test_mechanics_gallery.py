@@ -29,6 +29,19 @@ def test_boom_and_limit_cycle(tmp_path):
     numbers = run("rigid_body_limit_cycle", tmp_path)
     assert numbers["Omega"]["actual"] == pytest.approx(1.3781238629, abs=2e-9)
     assert numbers["khat_squared"] == pytest.approx(0.25, abs=1e-6)
+    assert numbers["Omega"]["third_order"]["mean"] == pytest.approx(1.3352, abs=5e-5)
+    assert numbers["c3"] == pytest.approx(0.738374562, abs=2e-8)
+
+
+@pytest.mark.slow
+def test_tumbling_bodies(tmp_path):
+    numbers = run("tumbling_debris", tmp_path)
+    assert numbers["status"] == "ok"
+    assert numbers["largest_error"]["osculating_from_mean"] < numbers["largest_error"]["osculating_start"]
+    assert numbers["evaluations"]["direct"] > 10_000 * numbers["evaluations"]["averaged"]
+    numbers = run("tumbling_separatrix", tmp_path)
+    assert numbers["event"]["t"] == pytest.approx(5412, abs=2)
+    assert (numbers["event"]["left"], numbers["event"]["entered"]) == ("LAM", "SAM")
 
 
 @pytest.mark.slow

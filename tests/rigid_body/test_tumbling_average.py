@@ -204,7 +204,7 @@ def test_resonances_are_reported():
     assert ratios
     for each in run.resonances:
         state = despun().solve(START, (0.35, 0.2, 1), [0, each.t], start="osculating", osculating=False)
-        k, m = state.k[-1], np.diff(state.alpha)[0]
+        k, m = state.k[-1], np.diff(state.H[:, 0])[0]
         assert 0 < k < 1
         assert m != 0
 
