@@ -236,8 +236,8 @@ def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol:
         knots.append(tuple(each[: given.knots].copy() for each in room))
         if given.steps + given.rejected > _MOST_STEPS:
             raise ComputationError(
-                f"{where}: {_MOST_STEPS} steps bring the motion to t = {given.t:.9g} only, or the state grows without bound; shorten "
-                "the time, loosen the tolerance, or check the gains"
+                f"{where}: {_MOST_STEPS} steps do not bring the error below {atol:g} beyond t = {given.t:.9g}, or the state grows "
+                "without bound; shorten the time, loosen the tolerance, or check the gains"
             )
     if status == _LOST:
         raise ComputationError(
