@@ -73,6 +73,9 @@ def reproduce(
         str, typer.Argument(help="Name of the figure; 'list' names them, 'all' makes every one.")
     ] = "satellite",
     out: Annotated[Path, _Optional(help="Folder for the picture and its numbers.")] = Path("results"),
+    formats: Annotated[
+        str, _Optional("--format", help="Formats beside the PNG, by commas: svg, pdf.", metavar="FORMATS")
+    ] = "png",
     json: Json = False,
 ) -> None:
     """Reproduce a figure of the papers: one picture, one JSON of numbers."""
@@ -83,19 +86,21 @@ def reproduce(
         names = {each.name: each.about for each in TARGETS}
         emit("\n".join(f"{name:24} {about}" for name, about in names.items()), {"figures": names}, json)
         return
+    kinds = list(dict.fromkeys(["png", *(each.strip().lower() for each in formats.split(","))]))
+    done = []
+    for name in [each.name for each in TARGETS] if figure == "all" else [figure]:
+        with progress(f"reproduce {name}") as report:
+            done.append(run_target(name, out, report, kinds))
+    pictures = {each.name: [each.picture.with_suffix(f".{kind}").resolve() for kind in kinds] for each in done}
     if figure == "all":
-        done = []
-        for each in TARGETS:
-            with progress(f"reproduce {each.name}") as report:
-                done.append(run_target(each.name, out, report))
-        pictures = {result.name: result.picture.resolve() for result in done}
-        emit("\n".join(f"{name:28} {path}" for name, path in pictures.items()), {"pictures": pictures}, json)
+        text = "\n".join(f"{name:28} {path}" for name, paths in pictures.items() for path in paths)
+        emit(text, {"pictures": {name: paths[0] for name, paths in pictures.items()}, "files": pictures}, json)
         return
-    with progress(f"reproduce {figure}") as report:
-        result = run_target(figure, out, report)
+    [result] = done
     lines = [f"  {name:28} {value}" for name, value in result.numbers.items()]
-    text = "\n".join([*lines, f"picture: {result.picture.resolve()}"])
-    emit(text, {"figure": result.name, "picture": result.picture.resolve(), "numbers": result.numbers}, json)
+    paths = pictures[result.name]
+    text = "\n".join([*lines, *(f"picture: {path}" for path in paths)])
+    emit(text, {"figure": result.name, "picture": paths[0], "files": paths, "numbers": result.numbers}, json)
 
 
 commands = (simulate, steer, reproduce)

@@ -1,4 +1,4 @@
-"""Colours, clean axes and small drawings shared by the attitude and tracking figures."""
+"""Clean axes and small drawings shared by the attitude and tracking figures."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-BLUE, RED, GREEN, GREY, ORANGE, PURPLE = "#1f5aa6", "#c8442f", "#2e8b57", "#8a8f98", "#d98c1f", "#7a4fa3"
-COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, GREY)
 
 
 def quiet(line: str) -> None:

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from lie_codegen.control.attitude_law import attitude_law
 from lie_codegen.control.closed_loop import closed_loop
 from lie_codegen.errors import InertiaWarning
-from lie_codegen.gallery.attitude_style import BLUE, COLOURS, GREY, bare_3d, quiet, sphere, tidy
+from lie_codegen.gallery.attitude_style import bare_3d, quiet, sphere, tidy
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, COLOURS, GREY
 from lie_codegen.runtime.build import build_kernels
 
 _INERTIA, _K_P, _K_D = (6, 3, 1), 4, 6

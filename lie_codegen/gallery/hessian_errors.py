@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.gallery import derivative_errors as study
-from lie_codegen.gallery.leonard_style import BLUE, GREEN, RED, plain
+from lie_codegen.gallery.leonard_style import plain
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREEN, RED
 
 _COLOURS = {"lie_codegen": BLUE, "jaxlie": RED, "liecasadi": GREEN}
 _ORDERS = ("value", "first derivative", "second derivative")

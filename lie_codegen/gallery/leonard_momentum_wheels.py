@@ -18,10 +18,11 @@ from lie_codegen.averaging.order_check import order_check
 from lie_codegen.flow.attitude_metrics import rotation_angle
 from lie_codegen.flow.batched_exponential import logm
 from lie_codegen.flow.reference_flow import reference_flow
-from lie_codegen.gallery.leonard_style import BLUE, GREEN, GREY, RED, SAND, bare, plain
+from lie_codegen.gallery.leonard_style import SAND, bare, plain
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREEN, GREY, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _WHEELS = MomentumWheels(
@@ -70,21 +71,27 @@ def _axial(areas: Any) -> Any:
 def _draw(theta_dot: PeriodicInput, u: PeriodicInput, averaged: Any, flow: Any, errors: dict[str, Any]) -> Any:
     figure = new_figure(12, 7.5)
     grid = figure.add_gridspec(2, 3)
-    figure.suptitle("A spacecraft turned by oscillating momentum wheels (TR 93-59, Figure 4)", fontsize=13)
+    figure.suptitle("A spacecraft turned by oscillating momentum wheels (TR 93-59, Figure 4)")
+    caption(
+        figure,
+        "Loops of pairs of angles, whose areas turn the body; attitude: the body simulated (colours), the area rule (dashed); "
+        "errors from the first period on.",
+    )
     sketch = figure.add_subplot(grid[:, 0], projection="3d")
     _sketch(sketch)
     loops = [figure.add_subplot(grid[row, 1]) for row in (0, 1)]
     t = np.linspace(0, u.T, 400)
-    for axes, signal, title in (
-        (loops[0], theta_dot, "wheel angles $\\theta$ [rad], per unit $\\epsilon$"),
-        (loops[1], u, "body angles $C\\theta$ [rad], per unit $\\epsilon$"),
+    for axes, signal, title, name in (
+        (loops[0], theta_dot, "wheel angles $\\theta$, per unit $\\epsilon$", "\\theta"),
+        (loops[1], u, "body angles $C\\theta$, per unit $\\epsilon$", "(C\\theta)"),
     ):
         tilde = signal.integral(t)
         for (i, j), colour in (((0, 1), BLUE), ((1, 2), RED), ((2, 0), GREEN)):
             axes.fill(tilde[:, i], tilde[:, j], color=colour, alpha=0.10)
-            axes.plot(tilde[:, i], tilde[:, j], color=colour, label=f"{i + 1} against {j + 1}")
-        axes.set(title=title, aspect="equal")
-        axes.legend(frameon=False, fontsize=8)
+            axes.plot(tilde[:, i], tilde[:, j], color=colour, label=f"${name}_{i + 1}, {name}_{j + 1}$")
+        axes.set(title=title, aspect="equal", xlabel="first of the pair [rad]", ylabel="second of the pair [rad]")
+        axes.set_adjustable("datalim")
+        axes.legend()
     drift, error = (figure.add_subplot(grid[row, 2]) for row in (0, 1))
     so3 = group("so3")
     actual, mean = (so3.project(logm(X)) for X in (flow.X, averaged.state(_EPS, flow.t)))
@@ -92,12 +99,13 @@ def _draw(theta_dot: PeriodicInput, u: PeriodicInput, averaged: Any, flow: Any, 
         drift.plot(flow.t, actual[:, i], color=colour, lw=1, label=f"axis {i + 1}")
         drift.plot(flow.t, mean[:, i], "--", color="0.15", lw=0.8)
     drift.plot([], [], "--", color="0.15", lw=0.8, label="area rule")
-    drift.set(title=f"attitude (rotation vector), $\\epsilon$ = {_EPS}", ylabel="rad")
-    drift.legend(frameon=False, fontsize=8)
+    drift.set(title=f"attitude, $\\epsilon = {_EPS}$", xlabel="t [s]", ylabel="rotation vector [rad]")
+    drift.legend()
+    late = flow.t >= u.T
     for (label, values), colour in zip(errors.items(), (BLUE, RED), strict=True):
-        error.semilogy(flow.t, np.maximum(values, 1e-7), color=colour, lw=0.9, label=label)
-    error.set(title="attitude error", xlabel="t [s]", ylabel="rad", ylim=(1e-6, None))
-    error.legend(frameon=False, fontsize=8)
+        error.semilogy(flow.t[late], values[late], color=colour, lw=0.9, label=label)
+    error.set(title="attitude error", xlabel="t [s]", ylabel="angle [rad]")
+    error.legend()
     plain(*loops, drift, error)
     return figure
 

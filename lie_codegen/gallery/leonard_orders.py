@@ -10,9 +10,10 @@ import numpy as np
 
 from lie_codegen.averaging.order_check import OrderCheck, measure, order_check, slopes
 from lie_codegen.averaging.printed_form import printed_state
-from lie_codegen.gallery.leonard_style import BLUE, RED, SEQUENCE, eps_axis, plain
+from lie_codegen.gallery.leonard_style import SEQUENCE, eps_axis, plain
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, RED
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _ZERO = (

@@ -15,10 +15,11 @@ import numpy as np
 from lie_codegen.averaging.actuated_inputs import oscillator_areas, oscillator_average
 from lie_codegen.flow.batched_exponential import expm, logm
 from lie_codegen.flow.reference_flow import reference_flow
-from lie_codegen.gallery.leonard_style import BLUE, GREEN, GREY, RED, SAND, bare, eps_axis, plain
+from lie_codegen.gallery.leonard_style import SAND, bare, eps_axis, plain
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.mechanics.actuators import PointMassOscillator
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREEN, GREY, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _BODY = PointMassOscillator(10, 2, [["3/2", "1/20", 0], ["1/20", "6/5", "1/25"], [0, "1/25", 1]])
@@ -69,7 +70,8 @@ def point_mass_oscillator(folder: Path, progress: Callable[[str], None] = lambda
 def _draw(x_dot: PeriodicInput, averaged: Any, flow: Any, errors: Any) -> Any:
     figure = new_figure(12, 7.5)
     grid = figure.add_gridspec(2, 3)
-    figure.suptitle("A spacecraft turned by a vibrating point mass (TR 93-59, Figure 5)", fontsize=13)
+    figure.suptitle("A spacecraft turned by a vibrating point mass (TR 93-59, Figure 5)")
+    caption(figure, "Attitude: the body simulated with its exact locked inertia (colours), both averages (black).")
     _sketch(figure.add_subplot(grid[:, 0], projection="3d"), x_dot)
     paths, shown = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     drift, order = figure.add_subplot(grid[0, 2]), figure.add_subplot(grid[1, 2])
@@ -78,13 +80,19 @@ def _draw(x_dot: PeriodicInput, averaged: Any, flow: Any, errors: Any) -> Any:
     for (i, j), colour in (((0, 1), BLUE), ((1, 2), RED), ((2, 0), GREEN)):
         paths.fill(x[:, i], x[:, j], color=colour, alpha=0.10)
         paths.plot(x[:, i], x[:, j], color=colour, label=f"$x_{i + 1}, x_{j + 1}$")
-    paths.set(title="path of the mass, per unit $\\epsilon$ [m]", aspect="equal")
-    paths.legend(frameon=False, fontsize=8)
+    paths.set(
+        title="path of the mass, per unit $\\epsilon$",
+        aspect="equal",
+        xlabel="first of the pair [m]",
+        ylabel="second of the pair [m]",
+    )
+    paths.set_adjustable("datalim")
+    paths.legend(loc="lower right")
     rate = true_rate(x_dot, _EPS)(t)
     for i, colour in enumerate((BLUE, RED, GREEN)):
         shown.plot(t, rate[:, i], color=colour, label=f"$\\Omega_{i + 1}$")
-    shown.set(title="body rate over one period [rad/s]", xlabel="t [s]")
-    shown.legend(frameon=False, fontsize=8)
+    shown.set(title=f"body rate over one period, $\\epsilon = {_EPS}$", xlabel="t [s]", ylabel="rate [rad/s]")
+    shown.legend()
     so3 = group("so3")
     actual = so3.project(logm(flow.X))
     for i, colour in enumerate((BLUE, RED, GREEN)):
@@ -93,13 +101,13 @@ def _draw(x_dot: PeriodicInput, averaged: Any, flow: Any, errors: Any) -> Any:
         turned = so3.project(logm(expm(so3.hat(flow.t[:, None] * averaged.drift(_EPS, terms)))))
         drift.plot(flow.t, turned, style, color="0.15", lw=0.9)
         drift.plot([], [], style, color="0.15", label="average (77)" if terms == 1 else "with the next order")
-    drift.set(title=f"attitude (rotation vector), $\\epsilon$ = {_EPS}", ylabel="rad", xlabel="t [s]")
-    drift.legend(frameon=False, fontsize=8)
+    drift.set(title=f"attitude, $\\epsilon = {_EPS}$", ylabel="rotation vector [rad]", xlabel="t [s]")
+    drift.legend()
     for column, label, colour in ((0, "average (77)", BLUE), (1, "with the next order", RED)):
         order.loglog(_SWEEP, errors[:, column], "o-", mfc="none", color=colour, label=label)
-    order.set(title="error of the drift rate [rad/s]")
+    order.set(title="error of the drift rate", ylabel="error [rad/s]")
     eps_axis(order, _SWEEP)
-    order.legend(frameon=False, fontsize=8)
+    order.legend()
     plain(paths, shown, drift, order)
     return figure
 

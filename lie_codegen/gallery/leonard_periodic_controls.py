@@ -15,9 +15,10 @@ import numpy as np
 from lie_codegen.averaging.areas import areas
 from lie_codegen.flow.batched_exponential import logm
 from lie_codegen.flow.reference_flow import reference_flow
-from lie_codegen.gallery.leonard_style import BLUE, GREEN, RED, eps_axis, plain
+from lie_codegen.gallery.leonard_style import eps_axis, plain
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREEN, RED
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPS = (0.4, 0.2, 0.1, 0.05)

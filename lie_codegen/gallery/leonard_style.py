@@ -1,11 +1,11 @@
-"""Colours and axes shared by the figures of TR 93-59."""
+"""Axes and colours shared by the figures of TR 93-59."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-BLUE, RED, GREEN, GREY, SAND = "#1f5aa6", "#c8442f", "#3b8a55", "#8a8f98", "#e9dfc9"
+SAND = "#e9dfc9"
 #: For families of curves, dark to light.
 SEQUENCE = ("#1b2a49", "#1f5aa6", "#3b8a55", "#d9a03f", "#c8442f", "#8e4585", "#5f6b7a", "#2a9d8f")
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from lie_codegen.errors import InputError
-from lie_codegen.pictures.result import GalleryResult
+from lie_codegen.pictures.result import GalleryResult, check_format
+from lie_codegen.pictures.style import style
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,19 @@ def target(name: str) -> Target:
     raise InputError(f"no figure {name!r}; there are {', '.join(each.name for each in TARGETS)}")
 
 
-def reproduce(name: str, folder: Path, progress: Callable[[str], None]) -> GalleryResult:
-    """Runs a target; its picture and numbers are written to the folder."""
+def reproduce(
+    name: str, folder: Path, progress: Callable[[str], None], formats: Sequence[str] = ("png",)
+) -> GalleryResult:
+    """Runs a target; its picture and numbers are written to the folder, the PNG always, "svg" and "pdf" where asked.
+
+    Raises:
+        InputError: no such target or format, told before anything is computed.
+    """
     chosen = target(name)
+    more = [check_format(each) for each in formats if each != "png"]
     function: Any = getattr(import_module(f"lie_codegen.gallery.{chosen.module}"), name)
-    result: GalleryResult = function(folder, progress)
+    with style():
+        result: GalleryResult = function(folder, progress)
+        for each in more:
+            result.write(each)
     return result

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREY, RED
 from lie_codegen.rigid_body.euler_average import euler_average
 from lie_codegen.rigid_body.euler_solutions import (
     explicit_inertia_change,
@@ -21,7 +22,6 @@ from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
 from lie_codegen.rigid_body.principal_body import TAU
 
 _EPS, _MOMENTUM, _K0 = 0.1, 40.0, 0.5
-_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
 
 
 def rigid_body_boom(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
@@ -60,25 +60,30 @@ def rigid_body_boom(folder: Path, progress: Callable[[str], None] = lambda line:
     }
     figure = new_figure(11, 9)
     axes: Any = figure.subplots(3, 2)
-    figure.suptitle("Boom deployment, $\\epsilon = 0.1$ (Coppola, Figure 1)", fontsize=13)
-    for row, actual, averaged, algebraic, name in (
-        (0, k**2, slow.k**2, explicit.k**2, "$k^2$"),
-        (1, energy, mean, explicit.T, "$T$ [J]"),
+    figure.suptitle("Boom deployment, $\\epsilon = 0.1$ (Coppola, Figure 1)")
+    for row, actual, averaged, algebraic, name, unit, about in (
+        (0, k**2, slow.k**2, explicit.k**2, "$k^2$", "", "squared modulus $k^2$"),
+        (1, energy, mean, explicit.T, "$T$", " [J]", "kinetic energy $T$"),
     ):
-        axes[row, 0].plot(t, actual, color=_GREY, lw=2.5, label="actual")
-        axes[row, 0].plot(t, averaged, color=_BLUE, label="averaged (28)")
-        axes[row, 0].plot(t, algebraic, "--", color=_RED, label="algebraic (32)")
-        axes[row, 0].set(ylabel=name, title=f"({'ac'[row]}) {name}")
-        axes[row, 1].plot(t, 100 * (averaged / actual - 1), color=_BLUE)
-        axes[row, 1].plot(t, 100 * (algebraic / actual - 1), "--", color=_RED)
+        axes[row, 0].plot(t, actual, color=GREY, lw=2.5, label="actual")
+        axes[row, 0].plot(t, averaged, color=BLUE, label="averaged (28)")
+        axes[row, 0].plot(t, algebraic, "--", color=RED, label="algebraic (32)")
+        axes[row, 0].set(ylabel=f"{name}{unit}", title=f"({'ac'[row]}) {about}")
+        axes[row, 1].plot(t, 100 * (averaged / actual - 1), color=BLUE, label="averaged (28)")
+        axes[row, 1].plot(t, 100 * (algebraic / actual - 1), "--", color=RED, label="algebraic (32)")
         axes[row, 1].set(ylabel="error [%]", title=f"({'bd'[row]}) relative error of {name}")
-    axes[0, 0].legend(frameon=False)
-    axes[2, 0].plot(t, np.degrees(np.arccos(cosines[:, 2])), color=_GREY, lw=0.8)
-    for bound in (third, third * np.sqrt(1 - slow.k**2)):
-        axes[2, 0].plot(t, np.degrees(np.arccos(bound)), color=_BLUE)
-    axes[2, 0].set(ylabel="degrees", xlabel="t [s]", title="(e) coning angle and its averaged bounds")
-    axes[2, 1].plot(t, cosines[:, 0], color=_GREY, lw=0.8)
-    axes[2, 1].plot(t, g13 * slow.k * third, color=_BLUE)
-    axes[2, 1].plot(t, -g13 * slow.k * third, color=_BLUE)
-    axes[2, 1].set(xlabel="t [s]", title="(f) $\\ell_1$ and its averaged amplitude $r_1$")
+        for axis in axes[row]:
+            axis.set_xlabel("t [s]")
+            axis.legend(loc="upper left" if row == 0 else "lower left")
+    axes[2, 0].plot(t, np.degrees(np.arccos(cosines[:, 2])), color=GREY, lw=0.8, label="actual")
+    for bound, label in ((third, "averaged bounds"), (third * np.sqrt(1 - slow.k**2), None)):
+        axes[2, 0].plot(t, np.degrees(np.arccos(bound)), color=BLUE, label=label)
+    axes[2, 0].set(ylabel="angle [degrees]", xlabel="t [s]", title="(e) coning angle and its averaged bounds")
+    axes[2, 1].plot(t, cosines[:, 0], color=GREY, lw=0.8, label="actual")
+    axes[2, 1].plot(t, g13 * slow.k * third, color=BLUE, label="averaged amplitude")
+    axes[2, 1].plot(t, -g13 * slow.k * third, color=BLUE)
+    axes[2, 1].set(xlabel="t [s]", ylabel="$\\ell_1$", title="(f) $\\ell_1$ and its averaged amplitude $r_1$")
+    axes[2, 0].legend(loc="upper left")
+    axes[2, 1].set_ylim(-0.85, 1.3)
+    axes[2, 1].legend(loc="upper left")
     return save("rigid_body_boom", folder, figure, numbers)

@@ -12,13 +12,13 @@ import numpy as np
 
 from lie_codegen.groups.build import build
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREY, RED
 from lie_codegen.rigid_body.elliptic_kernels import elliptic_kernels
 from lie_codegen.rigid_body.euler_average import euler_average
 from lie_codegen.rigid_body.euler_solutions import solve_actual, solve_averaged
 from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
 
 _EPSILONS = (0.05, 0.025, 0.0125, 0.00625, 0.003125, 0.0015625)
-_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
 
 
 def rigid_body_cost(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
@@ -50,16 +50,16 @@ def rigid_body_cost(folder: Path, progress: Callable[[str], None] = lambda line:
     }
     figure = new_figure(12, 4.2)
     axes: Any = figure.subplots(1, 3)
-    axes[0].loglog(_EPSILONS, errors, "o-", color=_BLUE, label=f"error, slope {slopes[-1]:.2f}")
-    axes[0].loglog(_EPSILONS, np.array(_EPSILONS) * errors[-1] / _EPSILONS[-1], "--", color=_GREY, label="slope 1")
+    axes[0].loglog(_EPSILONS, errors, "o-", color=BLUE, label=f"error, slope {slopes[-1]:.2f}")
+    axes[0].loglog(_EPSILONS, np.array(_EPSILONS) * errors[-1] / _EPSILONS[-1], "--", color=GREY, label="slope 1")
     axes[0].set(title="slow variables over $1/\\epsilon$", xlabel="$\\epsilon$", ylabel="largest error")
-    axes[1].loglog(_EPSILONS, [s for s, _ in seconds], "o-", color=_RED, label="full equations")
-    axes[1].loglog(_EPSILONS, [s for _, s in seconds], "o-", color=_BLUE, label="averaged")
+    axes[1].loglog(_EPSILONS, [s for s, _ in seconds], "o-", color=RED, label="full equations")
+    axes[1].loglog(_EPSILONS, [s for _, s in seconds], "o-", color=BLUE, label="averaged")
     axes[1].set(title="cost over $1/\\epsilon$, tolerance $10^{-9}$", xlabel="$\\epsilon$", ylabel="seconds")
     axes[1].invert_xaxis()
     axes[0].invert_xaxis()
     names = list(nanoseconds)
-    axes[2].barh(names, [nanoseconds[n] for n in names], color=[_BLUE if "kernel" in n else _GREY for n in names])
+    axes[2].barh(names, [nanoseconds[n] for n in names], color=[BLUE if "kernel" in n else GREY for n in names])
     axes[2].set(title="sn, cn, dn (kernels: and Zeta)", xlabel="ns an evaluation", xscale="log")
     for axis in axes[:2]:
         axis.legend(frameon=False)

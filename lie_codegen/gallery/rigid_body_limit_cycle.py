@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.gallery.attitude_style import bare_3d, sphere
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREEN, GREY, RED, caption
 from lie_codegen.rigid_body.euler_average import euler_average
 from lie_codegen.rigid_body.euler_equilibria import limit_cycles, momentum_directions
 from lie_codegen.rigid_body.euler_solutions import solve_actual, solve_averaged
 from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
 
 _EPS = 0.1
-_BLUE, _RED, _GREY, _GREEN = "#1f5aa6", "#c8442f", "#8a8f98", "#2e8b57"
 
 
 def rigid_body_limit_cycle(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
@@ -57,42 +58,59 @@ def rigid_body_limit_cycle(folder: Path, progress: Callable[[str], None] = lambd
         "c3": c3,
         "k_squared_at_start": float(first.k**2),
     }
-    figure = new_figure(11, 10)
-    axes: Any = figure.subplots(3, 2)
-    figure.suptitle("Limit cycle by linear feedback, $\\epsilon = 0.1$ (Coppola, Figure 3)", fontsize=13)
+    figure = new_figure(11, 12)
+    axes: Any = figure.subplots(3, 2, height_ratios=(1.7, 1, 1))
+    figure.suptitle("Limit cycle by linear feedback, $\\epsilon = 0.1$ (Coppola, Figure 3)")
+    caption(
+        figure,
+        "Grey: the full equations. Blue: averaged. Dashed red: the limit cycle, $\\hat k^2 = 0.25$ (printed as $\\hat k$).",
+    )
     late = t > 150
     axes[0, 0].remove()
     ball: Any = figure.add_subplot(3, 2, 1, projection="3d")
-    u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 37), np.linspace(0, np.pi, 19))
-    ball.plot_wireframe(np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v), color="#dddddd", lw=0.4)
-    ball.plot(*cosines[late].T, color=_GREY, lw=0.8)
-    ball.plot(*ring.T, color=_BLUE, lw=1.6)
-    ball.set(title="(a) momentum sphere", box_aspect=(1, 1, 1))
-    axes[0, 1].plot(cosines[late, 0], cosines[late, 1], color=_GREY, lw=0.8, label="actual, t > 150 s")
-    axes[0, 1].plot(ring[:, 0], ring[:, 1], color=_BLUE, label="averaged")
-    axes[0, 1].set(title="(b) $\\ell_1$, $\\ell_2$", aspect="equal")
-    axes[0, 1].legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1))
+    sphere(ball)
+    for e, name in zip(np.eye(3), ("$\\ell_1$", "$\\ell_2$", "$\\ell_3$"), strict=True):
+        ball.plot(*np.array([e, 1.2 * e]).T, color="0.35", lw=0.9)
+        ball.text(*(1.3 * e), name, color="0.25", ha="center", va="center")
+    ball.plot(*cosines[late].T, color=GREY, lw=0.8)
+    ball.plot(*ring.T, color=BLUE, lw=1.6)
+    bare_3d(ball, 0.8)
+    ball.view_init(38, 35)
+    ball.set_title("(a) direction of the momentum in the body")
+    axes[0, 1].plot(cosines[late, 0], cosines[late, 1], color=GREY, lw=0.8, label="actual, t > 150 s")
+    axes[0, 1].plot(ring[:, 0], ring[:, 1], color=BLUE, label="averaged")
+    axes[0, 1].set(
+        title="(b) seen along $\\ell_3$",
+        xlabel="$\\ell_1$",
+        ylabel="$\\ell_2$",
+        aspect="equal",
+        xlim=(-0.75, 0.75),
+        ylim=(-0.75, 0.75),
+    )
+    axes[0, 1].legend(loc="lower right")
     panels = (
-        (axes[1, 0], actual.k**2, (slow.k**2,), "(c) $k^2$"),
-        (axes[1, 1], actual.Omega, (slow.Omega,), "(d) $\\Omega$ [rad/s], repaired: the mean start rises"),
+        (axes[1, 0], actual.k**2, (slow.k**2,), "(c) $k^2$", "$k^2$"),
+        (axes[1, 1], actual.Omega, (slow.Omega,), "(d) $\\Omega$, repaired: the mean start rises", "$\\Omega$ [rad/s]"),
         (
             axes[2, 0], np.degrees(np.arccos(cosines[:, 2])),
             tuple(np.degrees(np.arccos(np.full_like(t, c))) for c in (third.max(), third.min())),
-            "(e) coning angle [deg] and bounds at $\\hat k$",
+            "(e) coning angle and its bounds at $\\hat k$",
+            "angle [degrees]",
         ),
         (axes[2, 1], cosines[:, 0], tuple(np.full_like(t, c) for c in (ring[:, 0].max(), ring[:, 0].min())),
-         "(f) $\\ell_1$ and $\\pm r_1(\\hat k)$"),
+         "(f) $\\ell_1$ and $\\pm r_1(\\hat k)$", "$\\ell_1$"),
     )  # fmt: skip
-    for axis, values, lines, title in panels:
-        axis.plot(t, values, color=_GREY, lw=0.7)
+    for axis, values, lines, title, label in panels:
+        axis.plot(t, values, color=GREY, lw=0.7)
         for line in lines:
-            axis.plot(t, line, color=_BLUE)
-        axis.set(title=title, xlabel="t [s]")
-    for run, colour, name in ((second, _GREEN, "mean, order 2"), (third_order, _RED, "mean, order 3")):
-        axes[1, 1].plot(run.t, run.mean.Omega, color=colour, label=name)
-        axes[1, 1].plot(run.t, run.Omega, color=colour, lw=0.6, alpha=0.6, label=f"osculating{name[4:]}")
+            axis.plot(t, line, color=BLUE)
+        axis.set(title=title, xlabel="t [s]", ylabel=label)
+    for run, colour, name in ((second, GREEN, "order 2"), (third_order, RED, "order 3")):
+        axes[1, 1].plot(run.t, run.mean.Omega, color=colour, label=f"mean, {name}")
+        axes[1, 1].plot(run.t, run.Omega, ":", color=colour, lw=0.9, label=f"osculating, {name}")
     axes[1, 1].lines[0].set_label("actual")
     axes[1, 1].lines[1].set_label("as the paper starts")
-    axes[1, 1].legend(frameon=False, fontsize=7, loc="upper left", bbox_to_anchor=(1.02, 1))
-    axes[1, 0].axhline(cycle.k**2, color=_RED, lw=0.8, ls="--")
+    axes[1, 1].set_ylim(None, 1.75)
+    axes[1, 1].legend(loc="upper left", ncols=3)
+    axes[1, 0].axhline(cycle.k**2, color=RED, lw=0.8, ls="--")
     return save("rigid_body_limit_cycle", folder, figure, numbers)

@@ -17,13 +17,13 @@ from lie_codegen.groups.build import build, generate
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.wei_norman.matrix import wei_norman
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREY, RED
 from lie_codegen.steering.closed_form.four_phase import average, integrals
 from lie_codegen.steering.front import steer
 
 _GD = (0.1, 0.05, np.pi / 40)
 _DURATION = 24.0
 _CONTROLS = ("w1", "w2")
-_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
 
 
 def satellite(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
@@ -68,16 +68,16 @@ def _draw(plan: Any, best: Any, t: Any, g: Any, mean: Any) -> Any:
     figure.suptitle("Two wheels, three axes: attitude by the area rule (TR 93-59, Figures 2 and 3)", fontsize=13)
     u, optimal = plan.u(t), best.u(t)
     for axes, column, name in zip(top, (0, 1), ("1", "2"), strict=True):
-        axes.plot(t, u[:, column], color=_BLUE, label="controls by the area rule")
-        axes.plot(t, optimal[:, column], color=_GREY, lw=1.2, label="controls of minimum energy")
+        axes.plot(t, u[:, column], color=BLUE, label="controls by the area rule")
+        axes.plot(t, optimal[:, column], color=GREY, lw=1.2, label="controls of minimum energy")
         axes.set(title=f"Figure 2: control $\\epsilon u_{name}$", ylabel="rad/s")
     for axes, column, letter in ((middle[0], 0, "a"), (middle[1], 1, "b"), (bottom[1], 2, "d")):
-        axes.plot(t, mean[:, column], color=_BLUE, label="second-order average")
-        axes.plot(t, g[:, column], "--", color=_RED, label="actual motion")
+        axes.plot(t, mean[:, column], color=BLUE, label="second-order average")
+        axes.plot(t, g[:, column], "--", color=RED, label="actual motion")
         axes.set(title=f"Figure 3({letter}): $g_{column + 1}$", ylabel="rad")
     loop = integrals(plan, t)
-    bottom[0].fill(loop[:, 0], loop[:, 1], color=_BLUE, alpha=0.12)
-    bottom[0].plot(loop[:, 0], loop[:, 1], color=_BLUE)
+    bottom[0].fill(loop[:, 0], loop[:, 1], color=BLUE, alpha=0.12)
+    bottom[0].plot(loop[:, 0], loop[:, 1], color=BLUE)
     bottom[0].set(
         title="Figure 3(c): the loop whose area turns axis 3",
         xlabel="$\\epsilon\\tilde u_1$ [rad]",

@@ -14,6 +14,7 @@ from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, save
 from lie_codegen.pictures.steering_picture import draw_plan
+from lie_codegen.pictures.style import caption
 from lie_codegen.steering.constraints import Cone
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
@@ -61,7 +62,14 @@ def steering_star_tracker(folder: Path, progress: Callable[[str], None] = lambda
         "bound_rad_s": _BOUND,
         "winner": plan.details["winner"],
     }
-    return save("steering_star_tracker", folder, draw_plan(plan, free.cost, [cone]), numbers)
+    figure = draw_plan(plan, free.cost, [cone])
+    figure.suptitle("Two wheels, bounded rates, and a star tracker (body axis 3) that keeps off the sun")
+    caption(
+        figure,
+        f"Rates at most {_BOUND:g} rad/s, their slopes at most {_RATE:g} rad/s$^2$, at rest at both ends; the cone has a "
+        f"half angle of {_HALF_ANGLE:g} rad. Endpoint error {plan.error:.1e}.",
+    )
+    return save("steering_star_tracker", folder, figure, numbers)
 
 
 def _integrated(plan: Plan, t: Array) -> Array:

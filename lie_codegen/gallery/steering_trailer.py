@@ -23,6 +23,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
 from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
+from lie_codegen.pictures.style import caption
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
 
@@ -83,21 +84,28 @@ def _figure(plan: Plan, t: Array, driven: dict[str, Array]) -> Any:
     parts = figure.add_gridspec(2, 2, width_ratios=(1.6, 1))
     axes = figure.add_subplot(parts[:, 0])
     for (name, way), colour in zip(driven.items(), COLOURS, strict=False):
-        axes.plot(way[:, 0], way[:, 1], color=colour, label=f"trailer: {name}")
+        axes.plot(way[:, 0], way[:, 1], color=colour, label=name)
     for x, y, phi, theta in driven["the figure of eight"][:: len(t) // 14]:
         hitch = np.array([x + _LENGTH * np.cos(phi), y + _LENGTH * np.sin(phi)])
         front = hitch + 0.4 * np.array([np.cos(theta), np.sin(theta)])
         axes.plot(*np.array([[x, y], hitch]).T, color=GREY, lw=1.2)
         axes.plot(*np.array([hitch, front]).T, color="k", lw=2.2)
-    axes.set(title="tractor (black) and trailer, moved sideways", xlabel="x [m]", ylabel="y [m]")
+    figure.suptitle("A tractor with a trailer moved one metre sideways: the figure of eight of the Engel group")
+    caption(
+        figure,
+        "Black: the tractor; grey: the trailer's bar, at even times of the figure of eight. The vehicle is integrated by SciPy.",
+    )
+    axes.set(title="paths of the trailer's axle", xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal", "datalim")
-    axes.legend(frameon=False)
+    axes.legend(loc="upper left")
     axes.grid(color="0.92")
-    draw_loops(figure.add_subplot(parts[0, 1]), plan, t, plan.u(t))
+    loops = figure.add_subplot(parts[0, 1])
+    draw_loops(loops, plan, t, plan.u(t))
+    loops.set(title="the figure of eight in chained form", xlabel=r"$\int u_1\,dt$ [m]", ylabel=r"$\int u_2\,dt$ [1/m]")
     below = figure.add_subplot(parts[1, 1])
-    for number, label in enumerate(("x [m]", "y [m]", "phi [rad]", "theta [rad]")):
+    for number, label in enumerate(("$x$ [m]", "$y$ [m]", r"trailer $\phi$ [rad]", r"tractor $\theta$ [rad]")):
         below.plot(t, driven["the figure of eight"][:, number], color=COLOURS[number], label=label)
-    below.set(title="the vehicle", xlabel="t [s]")
+    below.set(title="the vehicle over time", xlabel="t [s]", ylabel="m, rad")
     below.legend(frameon=False, ncols=2)
     below.grid(color="0.92")
     return figure

@@ -16,9 +16,10 @@ from lie_codegen.control.hybrid_law import hybrid_law
 from lie_codegen.control.observer import observer
 from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.tracking_law import tracking_law
-from lie_codegen.gallery.attitude_style import COLOURS, quiet, tidy
+from lie_codegen.gallery.attitude_style import quiet, tidy
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import COLOURS
 
 _BODY = ((2, 0.3, -0.2), (0.3, 1.5, 0.1), (-0.2, 0.1, 1))
 _SO3: dict[str, Any] = {"inertia": _BODY, "error": "so3_right", "gains": {"K_p": [4, 5, 6], "K_d": [3, 4, 5]}}

@@ -10,22 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.control.tracking_law import tracking_law
-from lie_codegen.gallery.attitude_style import BLUE, RED, quiet
+from lie_codegen.gallery.attitude_style import quiet
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.kernels import group_kernel
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, RED, caption
 from lie_codegen.runtime.build import build_kernels
 
 _METRIC = (4.0, 1.0, 1.5)
 _STEP, _STEPS = 0.005, 1600
 _STARTS = 12
+#: Frames are drawn this far apart along a path, up to this far from the goal, where they would hide each other. [m]
+_APART, _NEAR = 0.35, 0.35
 
 
 def tracking_planar_flows(folder: Path, progress: Callable[[str], None] = quiet) -> GalleryResult:
     """Frames on the plane flowing down the three error functions; gains equal to the metric (J, m_x, m_y)."""
     figure = new_figure(13, 5)
-    figure.suptitle("Gradient flows of the error functions on SE(2), metric (J, m_x, m_y) = (4, 1, 1.5) (Figure 5)")
+    figure.suptitle(
+        r"Gradient flows of the error functions on SE(2), metric $(J, m_x, m_y) = (4, 1, 1.5)$ (Bullo and Murray, Figure 5)"
+    )
+    caption(
+        figure,
+        f"Body frames (first axis red) every {_APART:g} m along the path, from the start to {_NEAR:g} m before the goal.",
+    )
     numbers: dict[str, Any] = {}
     rows = (
         ("1", r"$\phi_1$: gains in space"),
@@ -37,11 +46,10 @@ def tracking_planar_flows(folder: Path, progress: Callable[[str], None] = quiet)
         flow, phi = _flow(row)
         for path in np.moveaxis(flow, 1, 0):
             axes.plot(path[:, 0, 2], path[:, 1, 2], color=BLUE, lw=0.9)
-            for X in path[:: _STEPS // 10]:
-                if np.hypot(X[0, 2], X[1, 2]) > 0.3:  # near the end they would hide each other
-                    _frame(axes, X)
-        axes.set(title=title, aspect="equal", xlim=(-1.9, 1.9), ylim=(-1.9, 1.9))
-        axes.axis("off")
+            for X in path[_evenly(path)]:
+                _frame(axes, X)
+        axes.plot(0, 0, "o", color="black", ms=4)
+        axes.set(title=title, aspect="equal", xlim=(-1.9, 1.9), ylim=(-1.9, 1.9), xlabel="x [m]", ylabel="y [m]")
         numbers[f"phi_{row}_left"] = float(np.max(phi))
         numbers[f"length_{row}"] = float(np.sum(np.linalg.norm(np.diff(flow[:, :, :2, 2], axis=0), axis=2)) / _STARTS)
     return save("tracking_planar_flows", folder, figure, numbers)
@@ -73,6 +81,15 @@ def _start(angle: float) -> NDArray[Any]:
     turn = 1.2
     c, s = np.cos(turn), np.sin(turn)
     return np.array([[c, -s, 1.5 * np.cos(angle)], [s, c, 1.5 * np.sin(angle)], [0, 0, 1]])
+
+
+def _evenly(path: NDArray[Any]) -> NDArray[Any]:
+    """The samples of a path that lie evenly along its length, however fast it was run through."""
+    places = path[:, :2, 2]
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    chosen = np.searchsorted(along, np.arange(0.0, along[-1] - _NEAR, _APART))
+    values: NDArray[Any] = chosen[np.linalg.norm(places[chosen], axis=1) > _NEAR]
+    return values
 
 
 def _frame(axes: Any, X: NDArray[Any]) -> None:

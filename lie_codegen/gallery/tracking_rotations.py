@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from lie_codegen.control.closed_loop import ClosedLoop, closed_loop
 from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.tracking_law import tracking_law
-from lie_codegen.gallery.attitude_style import BLUE, GREEN, GREY, RED, brick, quiet
+from lie_codegen.gallery.attitude_style import brick, quiet
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREEN, GREY, RED
 
 #: The angle 2 pi (3 t^2 - t^3/5)/100: rest to rest in 10 s through 2 pi; the printed velocity 2 pi (3 t^2 - t)/100
 # makes 19 pi.

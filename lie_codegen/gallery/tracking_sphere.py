@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.gallery.attitude_style import BLUE, COLOURS, RED, bare_3d, quiet, sphere
+from lie_codegen.gallery.attitude_style import bare_3d, quiet, sphere
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, COLOURS, RED, caption
 
 #: Where the paths start and end: latitude and longitude [rad].
 _FROM, _TO = (0.25, -0.2), (0.85, 2.0)
+#: The transport maps are seen from this elevation and azimuth [degrees], at this many points of the whole sphere.
+_VIEW, _POINTS = (48.0, 25.0), 260
 
 
 def tracking_sphere(folder: Path, progress: Callable[[str], None] = quiet) -> GalleryResult:
@@ -28,7 +31,14 @@ def tracking_sphere(folder: Path, progress: Callable[[str], None] = quiet) -> Ga
     paths = {name: _great_circle(q, r) if chart is None else chart(q, r) for name, chart in charts.items()}
     lengths = {name: float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1))) for name, path in paths.items()}
     figure = new_figure(12, 8.4)
-    figure.suptitle("Errors on the sphere: straight lines of four charts (Figure 1), and two transport maps (Figure 2)")
+    figure.suptitle(
+        "Errors on the sphere: straight lines of four charts, and two transport maps (Bullo and Murray, Figures 1 and 2)"
+    )
+    caption(
+        figure,
+        "Below: the velocity at the tilted point (red) carried to other points of the near side (blue, drawn shorter, "
+        "both panels to one scale).",
+    )
     for number, (name, path) in enumerate(paths.items()):
         axes = figure.add_subplot(2, 4, number + 1, projection="3d")
         sphere(axes)
@@ -36,24 +46,25 @@ def tracking_sphere(folder: Path, progress: Callable[[str], None] = quiet) -> Ga
         axes.scatter(*np.array([q, r]).T, color="black", s=14)
         axes.view_init(elev=25, azim=50)
         bare_3d(axes, 0.7)
-        axes.set_title(f"{name}\nlength {lengths[name]:.4f}", fontsize=10)
+        axes.set_title(f"{name.replace('1 - q.r', '$1 - q^T r$')}\nlength {lengths[name]:.4f}")
     tilted = _point(1.25, 0.3)
     ours = _field(lambda p: _transport(p, tilted, _velocity(tilted, 0.7)))
     theirs = _field(lambda p: _by_chart(p, tilted, _velocity(tilted, 0.7)))
     progress("transport maps")
     for place, field, title in (
-        (3, ours, "T = (q.r) 1 - r q': smooth everywhere"),
+        (3, ours, r"$\mathcal{T} = (q^T r)\,1 - r\,q^T$: smooth everywhere"),
         (4, theirs, "by latitude and longitude: breaks at the pole N"),
     ):
         axes = figure.add_subplot(2, 2, place, projection="3d")
         sphere(axes)
         points, arrows = field
-        axes.quiver(*points.T, *(0.35 * arrows).T, color=BLUE, lw=0.8, arrow_length_ratio=0.3)
+        axes.quiver(*points.T, *(0.2 * arrows).T, color=BLUE, lw=0.9, arrow_length_ratio=0.35)
+        axes.scatter(0, 0, 1, color="black", s=12)
         axes.quiver(*(1.02 * tilted), *_velocity(tilted, 0.7), color=RED, lw=3, arrow_length_ratio=0.25)
-        axes.text(0, 0, 1.12, "N", fontsize=11)
-        axes.view_init(elev=48, azim=25)
+        axes.text(0, 0, 1.08, "N", fontsize=11)
+        axes.view_init(*_VIEW)
         bare_3d(axes, 0.75)
-        axes.set_title(title, fontsize=10)
+        axes.set_title(title)
     near = [_point(np.pi / 2 - 1e-6, a) for a in (0.0, np.pi)]
     numbers = {
         "lengths": lengths,
@@ -134,5 +145,8 @@ def _chart_basis(q: Array) -> tuple[Array, Array]:
 
 
 def _field(function: Callable[[Array], Array]) -> tuple[Array, Array]:
-    points = [_point(b, a) for b in np.linspace(0.05, 1.5, 9) for a in np.linspace(0, 2 * np.pi, 18, endpoint=False)]
-    return np.array(points), np.array([function(p) for p in points])
+    """The function at points spread evenly over the side that is seen: a spiral of the golden angle, equal areas apart."""
+    k = np.arange(_POINTS)
+    points = _point(np.arcsin(1 - (2 * k + 1) / _POINTS), k * np.pi * (3 - np.sqrt(5)))
+    points = points[points @ _point(*np.radians(_VIEW)) > 0.25]
+    return points, np.array([function(p) for p in points])

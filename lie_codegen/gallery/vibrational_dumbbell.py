@@ -25,16 +25,16 @@ from lie_codegen.mechanics.lagrangian_step import lagrangian_variational_step
 from lie_codegen.mechanics.relative_equilibria import relative_equilibrium
 from lie_codegen.mechanics.routh import RouthReduction, routh_reduce
 from lie_codegen.mechanics.vector_fields import lie_bracket, symmetric_product
-from lie_codegen.mechanics.vibrational_average import integrate, vibrational_average
+from lie_codegen.mechanics.vibrational_average import VibrationalAverage, integrate, vibrational_average
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback, design_feedback
 from lie_codegen.mechanics.vibrational_fields import vibrational_fields
 from lie_codegen.mechanics.vibrational_law import closed_loop_start, feedback_kernels
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREY, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _P, _RATIO, _OMEGA, _K1, _K2 = 2.00102, 0.05, 50.0, 0.7, -2.1
 _START = (1.00027, 1.6008, 0.001555, 0.0)
-_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
 
 
 def dumbbell(ratio: float) -> RouthReduction:
@@ -52,7 +52,7 @@ def dumbbell(ratio: float) -> RouthReduction:
 
 
 def vibrational_dumbbell(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
-    """Four panels: averaged as printed, actual as printed, actual without amplitude feedback, corrected design."""
+    """Actual and averaged on one axis: as printed, without amplitude feedback, and by the corrected design."""
     reduced = dumbbell(_RATIO)
     alone = relative_equilibrium(reduced, [1.0, np.pi / 2], {"p": _P})
     progress("the averaged system (19), as printed")
@@ -93,28 +93,81 @@ def vibrational_dumbbell(folder: Path, progress: Callable[[str], None] = lambda 
             "rho_amplitude_last_orbit_with": _amplitude(corrected.run[-100:, 0]),
         },
     }
-    figure = new_figure(12, 8)
-    axes: Any = figure.subplots(2, 2)
-    figure.suptitle("Dumbbell in orbit (Sanyal, Bloch and McClamroch, Figure 3): what reproduces", fontsize=13)
-    orbits = t / (2 * np.pi)
-    axes[0, 0].plot(orbits, averaged[:, 0], color=_BLUE, lw=0.7)
-    axes[0, 0].set(title="reproduces: averaged (19), printed $T^j$ and gains", xlabel="orbits", ylabel="$\\rho$")
-    axes[0, 1].plot(actual[:, 0], actual[:, 2] - np.pi / 2, color=_RED)
-    axes[0, 1].set(
-        title=f"does not: actual with (36), (37) escapes at {escape:.2f}",
-        xlabel="orbital time",
-        ylabel="$\\theta-\\pi/2$",
+    figure = new_figure(12, 11)
+    _draw_printed(figure, t, averaged, free, discrete, calm, actual, escape)
+    _draw_corrected(figure, corrected)
+    figure.suptitle(
+        "Dumbbell in orbit (Sanyal, Bloch and McClamroch, Figure 3): what reproduces, and the corrected design"
     )
-    axes[1, 0].plot(orbits, free[:, 0], color=_GREY, lw=0.7)
-    axes[1, 0].plot(np.arange(len(discrete)) / _OMEGA, discrete[:, 0], color=_RED, lw=0.4, ls="--", label="variational")
-    axes[1, 0].set(title="looks like the figure: actual, PD and sin, no feedback", xlabel="orbits", ylabel="$\\rho$")
-    axes[1, 1].plot(corrected.t / (2 * np.pi), corrected.without[:, 0], color=_GREY, lw=0.9, label="PD and vibration")
-    axes[1, 1].plot(
-        corrected.t / (2 * np.pi), corrected.run[:, 0], color=_BLUE, lw=1.1, label="amplitude feedback, in C"
+    caption(
+        figure,
+        "Grey: actual motion; in (a)-(c) by PD and sine alone, which looks like the figure, in (d) with the printed feedback. "
+        "Reconstructed: the averaged motion carried to the phase at which amplitudes switch.",
     )
-    axes[1, 1].set(title="corrected design, LQR, $l/R = 0.3$, actual motion", xlabel="orbits", ylabel="$\\rho$")
-    axes[1, 1].legend(frameon=False, loc="lower right")
     return save("vibrational_dumbbell", folder, figure, numbers)
+
+
+def _draw_printed(
+    figure: Any,
+    t: Array,
+    averaged: Array,
+    free: Array,
+    discrete: Array,
+    calm: VibrationalAverage,
+    actual: Array,
+    escape: float,
+) -> None:
+    near = np.linspace(0, 6 * np.pi, 3001)
+    close = calm.solve_actual(_START, near, 1 / _OMEGA, {"p": _P}, rtol=1e-8)
+    mean = calm.solve(calm.start(_START, 1 / _OMEGA, {"p": _P}), near, 1 / _OMEGA, {"p": _P}, rtol=1e-8)
+    first = t <= near[-1]
+    axes = [figure.add_subplot(3, 2, number) for number in (1, 2, 3, 4)]
+    axes[0].plot(t / (2 * np.pi), free[:, 0], color=GREY, lw=0.5, label="actual")
+    axes[0].plot(t / (2 * np.pi), averaged[:, 0], color=BLUE, lw=0.5, label="averaged (19), as printed")
+    axes[0].set(title="(a) distance, 90 orbits: both decay slowly", xlabel="orbits", ylabel="$\\rho$")
+    for panel, column, shift, title, label in (
+        (axes[1], 0, 0.0, "(b) distance, the first orbits", "$\\rho$"),
+        (axes[2], 1, np.pi / 2, "(c) attitude, the first orbits", "$\\theta - \\pi/2$ [rad]"),
+    ):
+        panel.plot(near / (2 * np.pi), close[:, column] - shift, color="0.75", lw=2 - 1.4 * column, label="actual")
+        panel.plot(near / (2 * np.pi), mean[:, column] - shift, "--", color=RED, lw=1.2, label="its average")
+        panel.plot(
+            t[first] / (2 * np.pi),
+            averaged[first, column] - shift,
+            color=BLUE,
+            lw=1.2,
+            label="averaged (19), as printed",
+        )
+        panel.set(title=title, xlabel="orbits", ylabel=label)
+    shown = np.arange(0, 151, 5)
+    axes[1].plot(shown / _OMEGA, discrete[shown, 0], ".", color="black", ms=4, label="variational step")
+    axes[3].plot(actual[:, 0], actual[:, 2] - np.pi / 2, color=GREY, lw=2, label="actual, feedback (36), (37)")
+    axes[3].plot(t[:2], averaged[:2, 1] - np.pi / 2, color=BLUE, label="averaged (19), as printed")
+    axes[3].set_xlim(-0.0005, 1.1 * escape)
+    axes[3].set(
+        title=f"(d) as printed, the actual motion escapes at {escape:.3f}",
+        xlabel="orbital time [rad]",
+        ylabel="$\\theta - \\pi/2$ [rad]",
+    )
+    for panel in axes:
+        panel.margins(y=0.25)
+        panel.legend(loc="upper left" if panel is axes[3] else "upper right", ncols=1 if panel is axes[3] else 2)
+
+
+def _draw_corrected(figure: Any, corrected: CorrectedRun) -> None:
+    orbits = corrected.t / (2 * np.pi)
+    rows = ((5, 0, 0.0, "(e) corrected design, LQR, $l/R = 0.3$: distance", "$\\rho$"),
+            (6, 1, np.pi / 2, "(f) corrected design: attitude", "$\\theta - \\pi/2$ [rad]"))  # fmt: skip
+    for place, column, shift, title, label in rows:
+        panel = figure.add_subplot(3, 2, place)
+        panel.plot(orbits, corrected.without[:, column] - shift, color=GREY, lw=0.9, label="actual, PD and vibration")
+        panel.plot(
+            orbits, corrected.run[:, column] - shift, color=BLUE, lw=2.2, alpha=0.5, label="actual, feedback in C"
+        )
+        panel.plot(orbits, corrected.averaged[:, column] - shift, "--", color=RED, lw=1, label="reconstructed")
+        panel.set(title=title, xlabel="orbits", ylabel=label)
+        panel.margins(y=0.15)
+        panel.legend(loc="upper right", ncols=3, columnspacing=1.0)
 
 
 def printed_average(reduced: RouthReduction) -> Callable[[float, Any], Any]:
@@ -184,12 +237,13 @@ def variational_run(reduced: RouthReduction, periods: int = 4500, steps: int = 6
 
 @dataclass(frozen=True)
 class CorrectedRun:
-    """The corrected design and actual motions with and without it, sampled once a period."""
+    """The corrected design and actual motions with and without it, sampled once a period; what the average reconstructs of it."""
 
     design: VibrationalFeedback
     t: Array
     run: Array
     without: Array
+    averaged: Array
 
 
 def corrected_design(eps: float = 0.01, orbits: int = 12) -> CorrectedRun:
@@ -209,7 +263,19 @@ def corrected_design(eps: float = 0.01, orbits: int = 12) -> CorrectedRun:
     still = replace(design, K=0 * design.K)
     silent = build(feedback_kernels(still, "dumbbell_free", steps=steps))
     rest = silent["loop"].scan(start, n=steps * periods, every=steps)
-    return CorrectedRun(design, t, loop, rest)
+    model = vibrational_average(reduced, u)
+    gain = np.ravel(design.K)
+
+    def mean(time: float, z: Array) -> Array:
+        alpha = float(np.clip(-gain @ (z - design.equilibrium), -5.0, 5.0))
+        return model.rate(z, eps, {"p": momentum, "alpha": alpha})
+
+    # the loop starts, and is sampled, at the phase where amplitudes switch: z belongs to y there
+    z0 = model.start(start[:4], eps, {"p": momentum, "alpha": 0.0}, tau=design.switch_phase)
+    z = integrate(mean, z0, t, 1e-8)
+    alpha = np.clip(-(z - design.equilibrium) @ gain, -5.0, 5.0)
+    y = model.reconstruct(z, design.switch_phase, eps, {"p": momentum, "alpha": alpha})
+    return CorrectedRun(design, t, loop, rest, y)
 
 
 def _amplitude(values: Array) -> float:

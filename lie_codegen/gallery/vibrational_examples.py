@@ -13,10 +13,10 @@ from lie_codegen.mechanics.lagrangian import LagrangianSystem, lagrangian_system
 from lie_codegen.mechanics.routh import RouthReduction, routh_reduce
 from lie_codegen.mechanics.vibrational_average import vibrational_average
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPSILONS = (0.004, 0.002, 0.001, 0.0005)
-_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
 
 
 def cart_pendulum() -> RouthReduction:
@@ -52,7 +52,11 @@ def vibrational_examples(folder: Path, progress: Callable[[str], None] = lambda 
     )  # fmt: skip
     figure = new_figure(11, 7.5)
     axes: Any = figure.subplots(2, 2)
-    figure.suptitle("Vibrated systems: actual and averaged", fontsize=13)
+    figure.suptitle("Vibrated systems: the actual motion and the one that an average reconstructs")
+    caption(
+        figure,
+        r"Left: $y = \Phi(\tau) P(\tau) z$ of the averaged state $z$. Right: errors at a whole number of periods near t = 0.5 s.",
+    )
     numbers: dict[str, Any] = {"eps": list(_EPSILONS)}
     for row, (name, system, u, y0, shown, horizon) in enumerate(cases):
         progress(name)
@@ -60,12 +64,18 @@ def vibrational_examples(folder: Path, progress: Callable[[str], None] = lambda 
         periods = round(horizon / (2 * np.pi * 0.01))
         t = 2 * np.pi * 0.01 * np.linspace(0, periods, 12 * periods + 1)
         axes[row, 0].plot(
-            t, models[0].solve_actual(y0, t, 0.01, rtol=1e-9)[:, shown], color=_GREY, lw=0.7, label="actual"
+            t, models[0].solve_actual(y0, t, 0.01, rtol=1e-9)[:, shown], color="0.75", lw=2.2, label="actual"
         )
-        for model, colour, label in zip(models, (_RED, _BLUE), ("order 1", "order 2"), strict=True):
-            axes[row, 0].plot(t, model.solve(y0, t, 0.01)[:, shown], color=colour, lw=1.1, label=f"averaged, {label}")
-        axes[row, 0].set(title=f"{name}, $\\epsilon = 0.01$", xlabel="t [s]", ylabel="rad")
-        axes[row, 0].legend(frameon=False, fontsize=8)
+        for model, colour, label in zip(models, (RED, BLUE), ("order 1", "order 2"), strict=True):
+            z = model.solve(model.start(y0, 0.01), t, 0.01)
+            y = model.reconstruct(z, t / 0.01, 0.01)
+            axes[row, 0].plot(t, y[:, shown], color=colour, lw=0.8, label=f"reconstructed, {label}")
+        axes[row, 0].set(
+            title=f"{name}, $\\epsilon = 0.01$",
+            xlabel="t [s]",
+            ylabel=("pendulum angle [rad]", "second joint [rad]")[row],
+        )
+        axes[row, 0].legend(loc="upper right")
         errors: list[list[float]] = [[], []]
         for eps in _EPSILONS:
             end = 2 * np.pi * eps * round(0.5 / (2 * np.pi * eps))
@@ -73,11 +83,11 @@ def vibrational_examples(folder: Path, progress: Callable[[str], None] = lambda 
             for kept, model in zip(errors, models, strict=True):
                 kept.append(float(np.abs(model.solve(y0, [0, end], eps)[-1] - exact).max()))
         slopes = [float(np.log(e[-2] / e[-1]) / np.log(_EPSILONS[-2] / _EPSILONS[-1])) for e in errors]
-        for kept, slope, colour in zip(errors, slopes, (_RED, _BLUE), strict=True):
-            axes[row, 1].loglog(_EPSILONS, kept, "o-", color=colour, label=f"slope {slope:.2f}")
-        axes[row, 1].set(title="error at t near 0.5", xlabel="$\\epsilon$")
+        for kept, slope, colour, order in zip(errors, slopes, (RED, BLUE), ("order 1", "order 2"), strict=True):
+            axes[row, 1].loglog(_EPSILONS, kept, "o-", color=colour, label=f"{order}, slope {slope:.2f}")
+        axes[row, 1].set(title="error of the average", xlabel="$\\epsilon$", ylabel="largest component")
         axes[row, 1].set_xticks(_EPSILONS, [str(e) for e in _EPSILONS])
         axes[row, 1].minorticks_off()
-        axes[row, 1].legend(frameon=False)
+        axes[row, 1].legend()
         numbers[name] = {"errors": errors, "slopes": slopes}
     return save("vibrational_examples", folder, figure, numbers)

@@ -20,10 +20,10 @@ from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback, desi
 from lie_codegen.mechanics.vibrational_fields import vibrational_fields
 from lie_codegen.mechanics.vibrational_law import closed_loop_start, feedback_kernels
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import BLUE, GREY, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPS, _STEPS = 0.01, 60
-_BLUE, _RED, _GREY = "#1f5aa6", "#c8442f", "#8a8f98"
 
 
 def vibrational_kapitza(folder: Path, progress: Callable[[str], None] = lambda line: None) -> GalleryResult:
@@ -67,25 +67,39 @@ def vibrational_kapitza(folder: Path, progress: Callable[[str], None] = lambda l
     }
     figure = new_figure(11, 7)
     axes: Any = figure.subplots(2, 2)
-    figure.suptitle("Kapitza's pendulum, $\\epsilon = 0.01$", fontsize=13)
-    axes[0, 0].plot(t, actual[:, 0], color=_GREY, lw=0.8, label="actual")
-    axes[0, 0].plot(t, means[0][:, 0], color=_RED, lw=1, label="averaged, order 1")
-    axes[0, 0].plot(t, means[1][:, 0], color=_BLUE, lw=1, label="averaged, order 2")
+    figure.suptitle("Kapitza's pendulum, $\\epsilon = 0.01$")
+    caption(
+        figure,
+        "Grey: actual motion. The amplitude $\\beta$ is that of the speed of the pivot; the law holds it over each period.",
+    )
+    axes[0, 0].plot(t, actual[:, 0], color=GREY, lw=0.8, label="actual")
+    axes[0, 0].plot(t, means[0][:, 0], color=RED, lw=1, label="averaged, order 1")
+    axes[0, 0].plot(t, means[1][:, 0], color=BLUE, lw=1, label="averaged, order 2")
     axes[0, 0].set(title="upright by vibration", xlabel="t [s]", ylabel="angle from the upright [rad]")
     angle = np.linspace(-np.pi, np.pi, 400)
-    for beta, colour in ((0.0, _GREY), (thresholds["averaged"], _RED), (6.0, _BLUE)):
+    for beta, colour in ((0.0, GREY), (thresholds["averaged"], RED), (6.0, BLUE)):
         axes[0, 1].plot(
-            angle, 9.81 * np.cos(angle) + beta**2 / 4 * np.sin(angle) ** 2, color=colour, label=f"$\\beta$ = {beta:.3f}"
+            angle,
+            9.81 * np.cos(angle) + beta**2 / 4 * np.sin(angle) ** 2,
+            color=colour,
+            label=rf"$\beta = {beta:.3g}$ m/s",
         )
-    axes[0, 1].set(title="effective potential; threshold $\\sqrt{2gl}$", xlabel="angle [rad]")
-    axes[1, 0].plot(times, loose[:, 0], color=_GREY, lw=0.8, label="constant amplitude")
-    axes[1, 0].plot(times, run[:, 0], color=_BLUE, lw=1, label="amplitude feedback, in C")
-    axes[1, 0].axhline(design.equilibrium[0], color=_RED, ls="--", lw=0.8, label="averaged equilibrium")
-    axes[1, 0].set(title="spherical pendulum at its unstable tilt", xlabel="t [s]", ylabel="rad")
-    axes[1, 1].step(times, 6 + run[:, 2], where="post", color=_BLUE)
-    axes[1, 1].set(title="amplitude, switched once a period", xlabel="t [s]")
+    axes[0, 1].set(
+        title=r"effective potential; threshold $\beta = \sqrt{2gl}$",
+        xlabel="angle from the upright [rad]",
+        ylabel="potential / mass [J/kg]",
+    )
+    axes[1, 0].plot(times, loose[:, 0], color=GREY, lw=0.8, label="constant amplitude")
+    axes[1, 0].plot(times, run[:, 0], color=BLUE, lw=1, label="amplitude feedback, in C")
+    axes[1, 0].axhline(design.equilibrium[0], color=RED, ls="--", lw=0.8, label="averaged equilibrium")
+    axes[1, 0].set(
+        title="spherical pendulum at its unstable tilt", xlabel="t [s]", ylabel="angle from the upright [rad]"
+    )
+    axes[1, 1].step(times[1:], 6 + run[1:, 2], where="post", color=BLUE)
+    axes[1, 1].axhline(6, color=GREY, lw=0.8, ls="--")
+    axes[1, 1].set(title="amplitude under feedback, switched once a period", xlabel="t [s]", ylabel=r"$\beta$ [m/s]")
     for axis in (axes[0, 0], axes[0, 1], axes[1, 0]):
-        axis.legend(frameon=False, fontsize=8)
+        axis.legend(frameon=False)
     return save("vibrational_kapitza", folder, figure, numbers)
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import MissingDependencyError, OutputFolderError
+from lie_codegen.errors import InputError, MissingDependencyError, OutputFolderError
+
+#: The formats a figure can be written in; the dates left out, so that equal figures are equal files.
+FORMATS: dict[str, dict[str, None]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
 @dataclass(frozen=True)
@@ -19,11 +22,43 @@ class GalleryResult:
         name: the target.
         picture: where the picture lies.
         numbers: what was measured, plain data for JSON.
+        figure: the matplotlib Figure, to be drawn on or written again.
     """
 
     name: str
     picture: Path
     numbers: Mapping[str, Any]
+    figure: Any = field(default=None, repr=False, compare=False)
+
+    def write(self, format: str) -> Path:
+        """The figure once more beside its PNG, as "svg" or "pdf": lines and letters that stay sharp at any size.
+
+        Raises:
+            InputError: any other format.
+            OutputFolderError: the folder cannot be written.
+        """
+        return write_figure(self.figure, self.picture.parent / f"{self.name}.{check_format(format)}")
+
+
+def check_format(format: str) -> str:
+    """The format, if it is one.
+
+    Raises:
+        InputError: it is none; lists those there are.
+    """
+    if format not in FORMATS:
+        raise InputError(f"no picture format {format!r}; there are {', '.join(FORMATS)}")
+    return format
+
+
+def write_figure(figure: Any, path: Path) -> Path:
+    """The figure in the format of the path's ending."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=150, metadata=FORMATS[path.suffix[1:]])
+    except OSError as error:
+        raise OutputFolderError(f"{path.parent}: cannot be written: {error.strerror or error}") from None
+    return path
 
 
 def save(name: str, folder: Path, figure: Any, numbers: Mapping[str, Any]) -> GalleryResult:
@@ -32,14 +67,12 @@ def save(name: str, folder: Path, figure: Any, numbers: Mapping[str, Any]) -> Ga
     Raises:
         OutputFolderError: the folder cannot be written.
     """
-    picture = folder / f"{name}.png"
+    picture = write_figure(figure, folder / f"{name}.png")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        figure.savefig(picture, dpi=150, metadata={"Software": None})
         (folder / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise OutputFolderError(f"{folder}: cannot be written: {error.strerror or error}") from None
-    return GalleryResult(name, picture, numbers)
+    return GalleryResult(name, picture, numbers, figure)
 
 
 def new_figure(width: float, height: float) -> Any:

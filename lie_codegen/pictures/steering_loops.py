@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.pictures.style import symbol
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop
 from lie_codegen.steering.plan import Plan
@@ -43,14 +44,18 @@ def _pairs(axes: Any, plan: Plan, t: Array, velocity: Array) -> None:
         x, y = curve[:, i], curve[:, j]
         area = float(np.trapezoid(x * u[:, j] - y * u[:, i], t) / 2)
         axes.fill(x, y, color=colour, alpha=0.12)
-        axes.plot(x, y, color=colour, label=f"{plan.controls[i]}, {plan.controls[j]}: area {area:.4g}")
+        axes.plot(x, y, color=colour, label=f"{symbol(plan.controls[i])}, {symbol(plan.controls[j])}: area {area:.4g}")
         axes.plot([x[-1], x[0]], [y[-1], y[0]], color=colour, ls="--", lw=1)
         axes.plot(x[-1], y[-1], "o", color=colour, ms=4)
     title = "integrated controls, closed by the chord" if pairs else "no pair of controls has a bracket"
     axes.set(title=title)
     if len(pairs) == 1:
         [(i, j)] = pairs
-        axes.set(xlabel=f"int {plan.controls[i]}", ylabel=f"int {plan.controls[j]}")
+        first, second = (f" [{unit}]" if unit else "" for unit in (plan.group.units[positions[k]] for k in (i, j)))
+        axes.set(
+            xlabel=rf"$\int$ {symbol(plan.controls[i])} $dt${first}",
+            ylabel=rf"$\int$ {symbol(plan.controls[j])} $dt${second}",
+        )
 
 
 def _segments(axes: Any, plan: Plan, chain: Chain) -> None:

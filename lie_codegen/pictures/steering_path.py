@@ -17,6 +17,9 @@ from lie_codegen.steering.plan import Plan
 
 _FRAMES = 12
 
+#: Cones in opposite directions favour no side.
+_NO_SIDE = 0.1
+
 
 def draw_path(figure: Any, place: Any, plan: Plan, t: Array, X: Array, obstacles: Sequence[Obstacle]) -> None:
     """The path in the way that suits the group."""
@@ -61,16 +64,29 @@ def _sphere(axes: Any, R: Array, name: str, obstacles: Sequence[Obstacle]) -> No
         axes.plot(*R[:, :, axis].T, color=colour, label=f"{name} {axis + 1}")
         axes.scatter(*R[0, :, axis], color="white", edgecolor=colour, s=18)
         axes.scatter(*R[-1, :, axis], color=colour, s=18)
+    seen = np.zeros(3)
     for obstacle in obstacles:
         if isinstance(obstacle, Cone):
             p = np.array(obstacle.parameters())
-            axes.plot(*(R @ p[:3]).T, color="k", lw=1, label="guarded axis")
-            axes.plot(*_circle(p[3:6], float(obstacle.half_angle)).T, color="k", ls="--", label="kept out of")
+            seen += p[3:6] / np.linalg.norm(p[3:6])
+            axes.plot(*(R @ p[:3]).T, color="k", lw=5, alpha=0.15, zorder=1, label="guarded axis")
+            axes.plot(*_circle(p[3:6], float(obstacle.half_angle)).T, color="k", ls="--", lw=1.2, label="kept out of")
     axes.set(title="path of the axes in space, from the open to the filled dots")
     axes.set_axis_off()
     axes.set_box_aspect((1, 1, 1), zoom=1.3)
-    axes.view_init(elev=25, azim=35)
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    elevation, azimuth = _facing(seen)
+    axes.view_init(elev=elevation, azim=azimuth)
+    axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(-0.1, 1))
+
+
+def _facing(direction: Array) -> tuple[float, float]:
+    """Elevation and azimuth [degrees] from which a cone there is seen open, a little from the side; without one the usual ones."""
+    if np.linalg.norm(direction) < _NO_SIDE:
+        return 25.0, 35.0
+    x, y, z = direction
+    return float(np.clip(np.degrees(np.arctan2(z, np.hypot(x, y))), -60, 60)), float(
+        np.degrees(np.arctan2(y, x))
+    ) + 15.0
 
 
 def _circle(direction: Array, angle: float) -> Array:

@@ -13,6 +13,7 @@ from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.pictures.result import new_figure
 from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
 from lie_codegen.pictures.steering_path import draw_path
+from lie_codegen.pictures.style import symbol
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan
 
@@ -52,8 +53,11 @@ def _motion(plan: Plan, t: Array) -> tuple[Array, Array]:
 def _controls(axes: Any, plan: Plan, t: Array) -> None:
     u = plan.u(t)
     for label, colour in zip(plan.controls, COLOURS * 3, strict=False):
-        axes.plot(t, u[:, plan.group.labels.index(label)], color=colour, label=label)
-    axes.set(title="controls", xlabel="t [s]", xlim=(0, plan.duration))
+        axes.plot(t, u[:, plan.group.labels.index(label)], color=colour, label=symbol(label))
+    units = dict.fromkeys(plan.group.units[plan.group.labels.index(label)] for label in plan.controls)
+    forces = plan.details.get("inertia") is not None  # controls are then torques and forces, not rates
+    rates = "" if forces or "" in units else "rate [" + ", ".join(f"{unit}/s" for unit in units) + "]"
+    axes.set(title="controls", xlabel="t [s]", ylabel=rates, xlim=(0, plan.duration))
     axes.legend(frameon=False)
     axes.grid(color="0.92")
 
@@ -65,5 +69,5 @@ def _cost(axes: Any, plan: Plan, minimum: float | None) -> None:
     bars = axes.barh(names, values, color=[COLOURS[0], GREY][: len(names)], height=0.5)
     axes.bar_label(bars, fmt="%.6g", padding=3)
     ratio = f", {plan.cost / minimum:.4g} times the least" if minimum else ""
-    axes.set(title="energy, int |u|^2 dt" + ratio, xlim=(0, 1.3 * max(*values, 1e-12)), ylim=(-0.7, 1.7))
+    axes.set(title=r"energy $\int |u|^2\,dt$" + ratio, xlim=(0, 1.3 * max(*values, 1e-12)), ylim=(-0.7, 1.7))
     axes.invert_yaxis()

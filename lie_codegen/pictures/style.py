@@ -1,0 +1,60 @@
+"""One style for every figure: light grid, no frame above and right, one size of type, the same colours."""
+
+from __future__ import annotations
+
+import re
+from contextlib import AbstractContextManager
+from typing import Any
+
+from lie_codegen.errors import MissingDependencyError
+
+#: Of lines and areas, in the order of use.
+BLUE, RED, GREEN, ORANGE, PURPLE, GREY = "#1f5aa6", "#c8442f", "#2e8b57", "#d98c1f", "#7a4fa3", "#8a8f98"
+COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, GREY)
+
+_SETTINGS: dict[str, Any] = {
+    "font.size": 10,
+    "figure.titlesize": 13,
+    "axes.titlesize": 11,
+    "axes.labelsize": 10,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "axes.edgecolor": "0.3",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.92",
+    "axes.formatter.use_mathtext": True,
+    "svg.hashsalt": "lie_codegen",  # the same file from the same numbers
+}
+
+
+def style() -> AbstractContextManager[None]:
+    """Figures made inside follow the style; the caller's own matplotlib settings are as before after it.
+
+    Raises:
+        MissingDependencyError: without matplotlib.
+    """
+    try:
+        from matplotlib import rc_context
+        from matplotlib.rcsetup import cycler
+    except ImportError:
+        raise MissingDependencyError(
+            "pictures need matplotlib: install lie_codegen with its extra, lie_codegen[plot]"
+        ) from None
+    context: AbstractContextManager[None] = rc_context({**_SETTINGS, "axes.prop_cycle": cycler(color=COLOURS)})
+    return context
+
+
+def caption(figure: Any, text: str) -> None:
+    """A sentence or two under the panels: what is seen, and what was left out."""
+    figure.supxlabel(text, fontsize=9, color="0.3", wrap=True)
+
+
+def symbol(label: str) -> str:
+    """A label as it is typeset: "w1" with its index below the line, any other as it is."""
+    found = re.fullmatch(r"([A-Za-z])_?(\d+)", label)
+    return f"${found[1]}_{{{found[2]}}}$" if found else label
