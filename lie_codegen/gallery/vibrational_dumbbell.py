@@ -101,8 +101,8 @@ def vibrational_dumbbell(folder: Path, progress: Callable[[str], None] = lambda 
     )
     caption(
         figure,
-        "Grey: actual motion; in (a)-(c) by PD and sine alone, which looks like the figure, in (d) with the printed feedback. "
-        "Reconstructed: the averaged motion carried to the phase at which amplitudes switch.",
+        "Grey: actual motion; in (a)-(c) by PD and sine alone, which looks like the figure. Reconstructed: the average carried to "
+        "the phase at which amplitudes switch.",
     )
     return save("vibrational_dumbbell", folder, figure, numbers)
 
