@@ -65,3 +65,23 @@ def test_frames_lie_evenly_along_a_path_however_it_is_run_through() -> None:
     path[:, 0, 2] = 1.5 * np.exp(-5 * np.linspace(0, 4, 20_001))
     places = path[_evenly(path), 0, 2]
     np.testing.assert_allclose(places, [1.5, 1.15, 0.8, 0.45], atol=2e-3)
+
+
+def test_a_cone_is_seen_open() -> None:
+    """The line of sight is within 35 degrees of any cone that is not behind the poles' limit; no cone, the usual view."""
+    from lie_codegen.pictures.steering_path import _facing
+
+    rng = np.random.default_rng(3)
+    for direction in rng.normal(size=(50, 3)):
+        direction = direction / np.linalg.norm(direction)
+        elevation, azimuth = np.radians(_facing(direction))
+        sight = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        assert direction @ sight > np.cos(np.radians(35))
+    assert _facing(np.zeros(3)) == (25.0, 35.0)
+
+
+@pytest.mark.parametrize(("label", "shown"), [("w1", "$w_{1}$"), ("x_12", "$x_{12}$"), ("x", "x"), ("vx", "vx")])
+def test_labels_are_typeset(label: str, shown: str) -> None:
+    from lie_codegen.pictures.style import symbol
+
+    assert symbol(label) == shown
