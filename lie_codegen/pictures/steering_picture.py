@@ -54,12 +54,17 @@ def _controls(axes: Any, plan: Plan, t: Array) -> None:
     u = plan.u(t)
     for label, colour in zip(plan.controls, COLOURS * 3, strict=False):
         axes.plot(t, u[:, plan.group.labels.index(label)], color=colour, label=symbol(label))
-    units = dict.fromkeys(plan.group.units[plan.group.labels.index(label)] for label in plan.controls)
-    forces = plan.details.get("inertia") is not None  # controls are then torques and forces, not rates
-    rates = "" if forces or "" in units else "rate [" + ", ".join(f"{unit}/s" for unit in units) + "]"
+    units = _units(plan)
+    rates = "rate [" + ", ".join(f"{unit}/s" for unit in units) + "]" if units else ""
     axes.set(title="controls", xlabel="t [s]", ylabel=rates, xlim=(0, plan.duration))
     axes.legend(frameon=False)
     axes.grid(color="0.92")
+
+
+def _units(plan: Plan) -> list[str]:
+    """The units of the controls' integrals, each once; none where one has none, or where controls are torques and forces."""
+    units = list(dict.fromkeys(plan.group.units[plan.group.labels.index(label)] for label in plan.controls))
+    return [] if "" in units or plan.details.get("inertia") is not None else units
 
 
 def _cost(axes: Any, plan: Plan, minimum: float | None) -> None:
@@ -71,3 +76,6 @@ def _cost(axes: Any, plan: Plan, minimum: float | None) -> None:
     ratio = f", {plan.cost / minimum:.4g} times the least" if minimum else ""
     axes.set(title=r"energy $\int |u|^2\,dt$" + ratio, xlim=(0, 1.3 * max(*values, 1e-12)), ylim=(-0.7, 1.7))
     axes.invert_yaxis()
+    units = _units(plan)
+    if len(units) == 1:
+        axes.set_xlabel(f"energy [{units[0]}$^2$/s]")
