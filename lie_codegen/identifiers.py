@@ -54,3 +54,12 @@ def check_identifier(name: object, what: str) -> str:
     if len(name) > 63:
         raise IdentifierError(f"{what} {name!r} has {len(name)} characters: C99 promises 63")
     return name
+
+
+def shown(value: object) -> str:
+    """The repr of any value in one line, cut; an integer too long to be written is described."""
+    try:
+        text = " ".join(repr(value).split())
+    except (ValueError, RecursionError):
+        return f"a {type(value).__name__} too long to be shown"
+    return text if len(text) <= 200 else f"{text[:200]}..."

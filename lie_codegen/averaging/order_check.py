@@ -12,11 +12,11 @@ from lie_codegen.arrays import Array
 from lie_codegen.averaging.averaged import average
 from lie_codegen.averaging.chart_limit import chart_end
 from lie_codegen.errors import AssumptionWarning, InputError
-from lie_codegen.exact.budget import shown
 from lie_codegen.flow.attitude_metrics import METRICS, distances
 from lie_codegen.flow.reference_flow import ReferenceFlow, reference_flow
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.periodic_input import PeriodicInput
 

@@ -24,10 +24,9 @@ from lie_codegen.control.loop_run import Run, noise_stream, refined
 from lie_codegen.control.loop_states import initial_own, own_states
 from lie_codegen.control.reference_check import check_once
 from lie_codegen.errors import InputError
-from lie_codegen.exact.budget import shown
 from lie_codegen.flow.events import Event, EventHits
 from lie_codegen.flow.pair853 import PairRun
-from lie_codegen.identifiers import unknown_keywords
+from lie_codegen.identifiers import shown, unknown_keywords
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.patience import shows_progress

@@ -11,7 +11,7 @@ import sympy as sp
 
 from lie_codegen.control.reference_motion import TIME, formula_of_time
 from lie_codegen.errors import InputError
-from lie_codegen.exact.budget import shown
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator

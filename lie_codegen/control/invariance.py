@@ -10,6 +10,8 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples, random_elements
+from lie_codegen.errors import InputError
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.saved import Saved
 
 _PLACES, _SAME = 12, 1e-9
@@ -32,7 +34,13 @@ class Invariance(Saved):
 
 @lru_cache(maxsize=64)
 def invariance(error: ErrorFunction) -> Invariance:
-    """The invariances of an error function."""
+    """The invariances of an error function.
+
+    Raises:
+        InputError: it is none, as `lc.error_function` makes it.
+    """
+    if not isinstance(error, ErrorFunction):
+        raise InputError(f"invariance: takes an error function, as lc.error_function makes it; given {shown(error)}")
     samples, rng = error_samples(error), np.random.default_rng(0)
     X, Y, G = (random_elements(error.group, _PLACES, rng, 1.0) for _ in range(3))
 

@@ -19,10 +19,10 @@ from lie_codegen.control.plants import GroupPlant, Plant, group_plant
 from lie_codegen.control.reference_kernels import reference as make_reference
 from lie_codegen.control.space_plants import named_plant, vibrated
 from lie_codegen.errors import InputError
-from lie_codegen.exact.budget import shown
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.definition import plain
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback

@@ -25,8 +25,8 @@ import numpy as np
 import sympy as sp
 
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.budget import shown
 from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import Definition, made_from
 from lie_codegen.kernel.kernel import Kernel, Port

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_ports import LoopLaw
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-from lie_codegen.exact.budget import shown
+from lie_codegen.identifiers import shown
 
 _RTOL = 1e-10
 #: Relative distance from a whole number of samples or steps that is rounding.

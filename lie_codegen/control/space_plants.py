@@ -22,10 +22,10 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.control.plants import Plant
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-from lie_codegen.exact.budget import shown
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.flow.product_step import Move
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator

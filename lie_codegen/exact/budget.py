@@ -166,12 +166,3 @@ def field_degree(values: list[sp.Expr]) -> int:
 
 def _is_square(value: int) -> bool:
     return value >= 0 and math.isqrt(value) ** 2 == value
-
-
-def shown(value: object) -> str:
-    """The repr of any value in one line, cut; an integer too long to be written is described."""
-    try:
-        text = " ".join(repr(value).split())
-    except (ValueError, RecursionError):
-        return f"a {type(value).__name__} too long to be shown"
-    return text if len(text) <= 200 else f"{text[:200]}..."

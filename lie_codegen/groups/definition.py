@@ -10,11 +10,11 @@ import sympy as sp
 
 from lie_codegen.algebra.constructions import algebra_from_brackets, algebra_from_matrices
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.budget import current_budget, over, shown
+from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.representation import faithful_representation
-from lie_codegen.identifiers import check_identifier
+from lie_codegen.identifiers import check_identifier, shown
 from lie_codegen.kernel.definition import makes_records
 
 

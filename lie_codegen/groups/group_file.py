@@ -20,10 +20,11 @@ from decimal import Decimal
 from typing import Any
 
 from lie_codegen.errors import ExpressionError, GroupFileError, InputError, ShapeError
-from lie_codegen.exact.budget import current_budget, over, shown
+from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.exact.numbers import Number, exact_number
 from lie_codegen.groups.definition import from_brackets, from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.identifiers import shown
 
 _KEYS = ("name", "labels", "description", "source", "units", "matrices", "brackets", "metadata")
 #: A dotted key from its first part on; the parser of TOML takes time that grows with the square of its length.

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 from lie_codegen.errors import InputError
-from lie_codegen.exact.budget import shown
+from lie_codegen.identifiers import shown
 
 Part = TypeVar("Part")
 

@@ -14,9 +14,9 @@ from lie_codegen.algebra.controllability import Controllability, control_indices
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
-from lie_codegen.exact.budget import shown
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.identifiers import shown
 from lie_codegen.steering.accessibility import with_drift
 
 #: Durations in seconds that double precision carries.

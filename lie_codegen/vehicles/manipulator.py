@@ -14,9 +14,9 @@ from typing import Any
 import sympy as sp
 
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.budget import shown
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port

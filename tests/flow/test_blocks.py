@@ -35,7 +35,7 @@ def test_blocks_of_steps_give_the_run_in_one(monkeypatch: pytest.MonkeyPatch) ->
     u = lc.PeriodicInput(["cos(t)", "sin(2*t)", "0"], period="2*pi")
     t = np.linspace(0, 300, 12)
     whole = lc.simulate("so3", u, t=t, steps=4000).X
-    monkeypatch.setattr(run, "_BLOCK", 333)
+    monkeypatch.setattr(run, "BLOCK", 333)
     np.testing.assert_allclose(lc.simulate("so3", u, t=t, steps=4000).X, whole, atol=1e-13)
 
 

@@ -160,7 +160,7 @@ def test_a_failure_is_told_when_the_kernel_is_asked_for_and_is_not_kept(
     with monkeypatch.context() as patch:
         patch.setattr(ladder, "compile_library", _full_disk)
         patch.setattr("lie_codegen.runtime.cache_door.temporary_folder", lambda reason: home)
-        with pytest.raises(OSError, match="No space left"):
+        with pytest.raises(lc.errors.CacheError, match="No space left"):
             library.exp  # noqa: B018
     assert library.exp([0.0, 0.0, 0.0])[0, 0] == 1.0
 

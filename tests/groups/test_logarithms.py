@@ -282,7 +282,8 @@ int main(void)
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc and its sanitizers")
-@pytest.mark.parametrize("name", ["su3", *(pytest.param(each, marks=pytest.mark.slow) for each in ("sp4", "so5"))])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["su3", "sp4", "so5"])
 def test_the_c_of_iterated_logarithms_is_strict_and_sound_on_anything(name: str, tmp_path: Path) -> None:
     """NaN, infinity, zero and singular matrices, Jordan blocks, tiny and huge ones, under the sanitizers of gcc."""
     rng = np.random.default_rng(15)
