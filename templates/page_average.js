@@ -2,16 +2,7 @@
 // closed form, X0 exp(t sum eps^q F_q) exp(sum eps^q Lambda_q(t)).
 (() => {
   const s = data.solver, d = s.start.length, n = s.basis.length, row = s.steps;
-  const product = (A, B) => A.map(a => B[0].map((_, j) => a.reduce((sum, x, k) => sum + x * B[k][j], 0)));
-  const hat = x => s.start.map((_, i) => s.start.map((_, j) => x.reduce((sum, c, k) => sum + c * s.basis[k][i][j], 0)));
-  const expm = A => {
-    const size = Math.max(...A.map(a => a.reduce((sum, x) => sum + Math.abs(x), 0))), halvings = Math.max(0, Math.ceil(Math.log2(size / .25 || 1)));
-    const small = A.map(a => a.map(x => x / 2 ** halvings));
-    let term = A.map((_, i) => A.map((_, j) => +(i === j))), sum = term;
-    for (let k = 1; k < 14; k++) { term = product(term, small).map(a => a.map(x => x / k)); sum = sum.map((a, i) => a.map((x, j) => x + term[i][j])); }
-    for (let k = 0; k < halvings; k++) sum = product(sum, sum);
-    return sum;
-  };
+  const hat = hatted(s.basis);
   const mix = (a, x, b, y) => x.map((v, i) => a * v + b * y[i]);
   const A1 = .25 + Math.sqrt(3) / 6, A2 = .25 - Math.sqrt(3) / 6;
   function states(eps) {

@@ -1,16 +1,7 @@
 // Dragging the target solves again: the generated C in WebAssembly, the same text that is compiled for Python and for flight.
 (() => {
   const s = data.solver, d = s.basis[0].length, n = s.basis.length, bytes = Uint8Array.from(atob(s.wasm), c => c.charCodeAt(0));
-  const product = (A, B) => A.map(a => B[0].map((_, j) => a.reduce((sum, x, k) => sum + x * B[k][j], 0)));
-  const hat = x => s.basis[0].map((row, i) => row.map((_, j) => x.reduce((sum, c, k) => sum + c * s.basis[k][i][j], 0)));
-  const expm = A => {
-    const size = Math.max(...A.map(a => a.reduce((sum, x) => sum + Math.abs(x), 0))), halvings = Math.max(0, Math.ceil(Math.log2(size / .25 || 1)));
-    const small = A.map(a => a.map(x => x / 2 ** halvings));
-    let term = A.map((_, i) => A.map((_, j) => +(i === j))), sum = term;
-    for (let k = 1; k < 14; k++) { term = product(term, small).map(a => a.map(x => x / k)); sum = sum.map((a, i) => a.map((x, j) => x + term[i][j])); }
-    for (let k = 0; k < halvings; k++) sum = product(sum, sum);
-    return sum;
-  };
+  const hat = hatted(s.basis);
   // what the C library may ask of a system: nothing is given
   const none = new Proxy({}, { get: () => () => 52 });
   const module = new WebAssembly.Module(bytes), program = new WebAssembly.Instance(module, { wasi_snapshot_preview1: none }).exports;

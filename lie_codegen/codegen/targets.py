@@ -48,6 +48,7 @@ _JS_WORDS = frozenset(
         "void",
     ]
 )
+#: A machine under load needs minutes for the first compilation, in which zig makes its C library.
 _SECONDS = 900
 
 
@@ -222,7 +223,7 @@ def _wasm(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> di
     wrapper = (
         f"static double space[{room}];\ndouble *lie_space(void);\ndouble *lie_space(void)\n{{\n    return space;\n}}\n"
     )
-    binary = _zig(tree, wrapper, ["lie_space", *(each.symbol for each in functions)])
+    binary = wasm_binary(tree, wrapper, ["lie_space", *(each.symbol for each in functions)])
     names = {
         "namespace": manifest["namespace"], "crate": _crate(manifest["namespace"]), "version": manifest["version"],
         "functions": functions, "wasm": base64.b64encode(binary).decode(),
@@ -236,7 +237,12 @@ def _wasm(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> di
     }
 
 
-def _zig(tree: Mapping[str, str], wrapper: str, exports: Sequence[str]) -> bytes:
+def wasm_binary(tree: Mapping[str, str], wrapper: str, exports: Sequence[str]) -> bytes:
+    """The C of a package and a wrapper as WebAssembly, by ziglang.
+
+    Raises:
+        CompileError: the compiler's own words.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _put(folder, {**{path: tree[path] for path in tree if path.endswith((".c", ".h"))}, "src/space.c": wrapper})

@@ -9,7 +9,6 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ChartError, ComputationError, InputError, NotOnGroupError, ShapeError
@@ -51,30 +50,11 @@ class FeedbackTrajectory(Trajectory):
     eps: Array = field(kw_only=True, repr=False)
     chart: Array | None = field(kw_only=True, repr=False)
 
-    def at(self, t: ArrayLike) -> Array:
-        """X at other times of the run, by a fresh run from the output time before.
-
-        Raises:
-            InputError: a time outside the run.
-        """
-        moments = np.asarray(t, dtype=float)
-        wanted = np.atleast_1d(moments)
-        if wanted.ndim != 1 or not np.all((wanted >= self.t[0]) & (wanted <= self.t[-1])):
-            raise InputError(
-                f"Trajectory.at({self.group.name}): t must be a number or (k,) numbers from {self.t[0]:.9g} to "
-                f"{self.t[-1]:.9g}, the times of the run"
-            )
-        stops, where = np.unique(wanted, return_inverse=True)
-        first = int(np.searchsorted(self.t, stops[0], side="right")) - 1
-        times = np.unique(np.concatenate([[self.t[first]], stops]))
-        if len(times) == 1:
-            found = self.X[first][None]
-        else:
-            law = Feedback(self.feedback, "X" if self.chart is None else "g")
-            chart = None if self.chart is None else self.chart[first]
-            found = feedback_flow(self.group, law, times, self.eps, self.X[first], rtol=self.rtol, chart=chart).X
-        found = found[len(found) - len(stops) :][where.reshape(wanted.shape)]
-        return np.asarray(found if moments.ndim else found[0])
+    def _flow(self, times: Array, start: Array) -> Array:
+        """X at the times after the first, by a fresh run from the output time that is the first."""
+        law = Feedback(self.feedback, "X" if self.chart is None else "g")
+        chart = None if self.chart is None else self.chart[int(np.searchsorted(self.t, times[0]))]
+        return feedback_flow(self.group, law, times, self.eps, start, rtol=self.rtol, chart=chart).X[1:]
 
     @cached_property
     def g(self) -> Array:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import base64
 import importlib.util
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lie_codegen.codegen.targets import wasm_binary
 from lie_codegen.errors import InputError, MissingDependencyError
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.build import generate
@@ -20,19 +19,18 @@ from lie_codegen.steering.plan import Plan
 
 _POINTS = 201
 _MOST_SIZE = 25
-#: A machine under load needs minutes for the first compilation, in which zig makes its C library.
-_SECONDS = 900
+
+_EXPORTS = ("lie_target", "lie_weights", "lie_u", "lie_X", "lie_cost", "lie_solve")
 
 _WRAPPER = """#include "{prefix}.h"
-#define EXPORT(name) __attribute__((export_name(name)))
 static double target[{size}], weights[{controls}], u[{points} * {controls}], X[{points} * {size}];
 static {prefix}_result result;
-EXPORT("lie_target") double *lie_target(void) {{ return target; }}
-EXPORT("lie_weights") double *lie_weights(void) {{ return weights; }}
-EXPORT("lie_u") double *lie_u(void) {{ return u; }}
-EXPORT("lie_X") double *lie_X(void) {{ return X; }}
-EXPORT("lie_cost") double *lie_cost(void) {{ return &result.cost; }}
-EXPORT("lie_solve") int lie_solve(void)
+double *lie_target(void) {{ return target; }}
+double *lie_weights(void) {{ return weights; }}
+double *lie_u(void) {{ return u; }}
+double *lie_X(void) {{ return X; }}
+double *lie_cost(void) {{ return &result.cost; }}
+int lie_solve(void)
 {{
     {prefix}_options options = {prefix}_defaults();
     {prefix}_solve(1, target, weights, &options, &result);
@@ -48,7 +46,7 @@ def page_solver(plan: Any) -> dict[str, Any]:
     Raises:
         InputError: what is shown is no plan of least energy, or of a group that the page cannot move.
         MissingDependencyError: no ziglang.
-        CodegenError: as `lc.generate`.
+        CodegenError: as `lc.generate`. CompileError: the compiler's own words.
     """
     if not isinstance(plan, Plan) or plan.method != "optimal" or plan.group.is_complex:
         raise InputError('view: solve=True takes a plan of method="optimal" on a real group')
@@ -61,11 +59,12 @@ def page_solver(plan: Any) -> dict[str, Any]:
         )
     with tempfile.TemporaryDirectory() as folder:
         package = generate(group, Path(folder) / "package", steering=plan.controls) / "steering"
-        header = next((package / "include").glob("*.h"))
-        wrapper = package / "src" / "page.c"
-        shape = {"prefix": header.stem, "size": group.degree**2, "controls": len(plan.controls), "points": _POINTS}
-        wrapper.write_text(_WRAPPER.format(**shape), encoding="utf-8")
-        binary = _compiled(package)
+        tree = {
+            path.relative_to(package).as_posix(): path.read_text(encoding="utf-8") for path in package.rglob("*.[ch]")
+        }
+    header = next(Path(path) for path in tree if path.startswith("include/"))
+    shape = {"prefix": header.stem, "size": group.degree**2, "controls": len(plan.controls), "points": _POINTS}
+    binary = wasm_binary(tree, _WRAPPER.format(**shape), _EXPORTS)
     x = logarithms(group).log(np.asarray(plan.target, dtype=float))
     weights = plan.details.get("weights")
     return {
@@ -83,19 +82,3 @@ def page_solver(plan: Any) -> dict[str, Any]:
         "target": np.asarray(x).tolist(),
         "plane": motion_of(group, np.asarray(plan.target)[None]).kind == "plane",
     }
-
-
-def _compiled(package: Path) -> bytes:
-    out = package / "page.wasm"
-    sources = [str(path) for path in sorted((package / "src").glob("*.c"))]
-    command = [
-        sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi", "-O2", "-s", "-mexec-model=reactor",
-        f"-I{package / 'include'}", f"-I{package / 'src'}", *sources, "-o", str(out),
-    ]  # fmt: skip
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=False)
-    except subprocess.TimeoutExpired:
-        raise InputError(f"view: the compiler of the page's solver took more than {_SECONDS} s") from None
-    if done.returncode or not out.is_file():
-        raise InputError(f"view: the page's solver does not compile: {done.stderr.strip()[-400:]}")
-    return out.read_bytes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,20 +19,24 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.values import Value
 
 
-class Distribution(Value):
+class Distribution(Value, ABC):
     """Base of what an input is drawn from.
 
     `slots` uniform numbers in (0, 1) make one value; `draw` makes many. Subclasses are frozen records of plain data.
     """
 
     @property
+    @abstractmethod
     def slots(self) -> int:
         """Uniform numbers for one value."""
-        raise NotImplementedError
 
     def draw(self, uniform: Array) -> Array:
-        """(N, slots) uniform numbers -> (N, ...) values."""
-        raise NotImplementedError
+        """(N, slots) uniform numbers -> (N, ...) values.
+
+        Raises:
+            InputError: of a Grid, which is gone through, and of a Joint, which makes several inputs at once.
+        """
+        raise InputError(f"a {type(self).__name__} is not drawn by itself; give it to lc.study in its space")
 
 
 def _numbers(where: str, value: ArrayLike) -> Array:

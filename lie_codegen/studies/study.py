@@ -23,7 +23,7 @@ from lie_codegen.studies.progress import bar
 from lie_codegen.studies.space import Space
 from lie_codegen.studies.stopping import Quantile
 from lie_codegen.studies.store import DONE, FAILED, Store, bit_class, same_manifest, zarr_module
-from lie_codegen.studies.tasks import SampleStatus, as_run
+from lie_codegen.studies.tasks import SampleStatus, as_run, mark
 
 _LARGEST_CHUNK, _MEMORY, _SECONDS = 10_000, 2**26, 10.0
 _READ = 200_000
@@ -200,11 +200,9 @@ def _chunk(job: Job, n: int, columns: Mapping[str, Array], outputs: Mapping[str,
 
 
 def _described(space: Space) -> Any:
-    from lie_codegen.studies.tasks import _mark
-
     return {
-        **{",".join(names): _mark(value) for names, value in space.inputs.items()},
-        **{name: _mark(function) for name, (function, _) in space.derived.items()},
+        **{",".join(names): mark(value) for names, value in space.inputs.items()},
+        **{name: mark(function) for name, (function, _) in space.derived.items()},
     }
 
 

@@ -158,8 +158,8 @@ class Run:
     @property
     def fingerprint(self) -> Any:
         """What it is, as plain data: a study is gone on with only where this is the same."""
-        parts = {"function": _mark(self.function), "arguments": _mark(self.arguments), "options": _mark(self.options)}
-        return parts | ({"reduce": _mark(self.reduce)} if self.reduce is not None else {})
+        parts = {"function": mark(self.function), "arguments": mark(self.arguments), "options": mark(self.options)}
+        return parts | ({"reduce": mark(self.reduce)} if self.reduce is not None else {})
 
 
 def as_run(what: Any, reduce: Callable[[Any], Mapping[str, Any]] | None = None) -> Run:
@@ -188,23 +188,21 @@ def _item(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _mark(value: Any) -> Any:
+def mark(value: Any) -> Any:
     """Plain data that changes where the value does."""
     try:
         return plain(value)
     except NoDefinitionError:
         pass
     if isinstance(value, Mapping):
-        return {str(key): _mark(each) for key, each in sorted(value.items(), key=lambda pair: str(pair[0]))}
+        return {str(key): mark(each) for key, each in sorted(value.items(), key=lambda pair: str(pair[0]))}
     if isinstance(value, list | tuple):
-        return [_mark(each) for each in value]
+        return [mark(each) for each in value]
     if isinstance(value, functools.partial):
-        return [_mark(value.func), _mark(value.args), _mark(value.keywords)]
+        return [mark(value.func), mark(value.args), mark(value.keywords)]
     if is_dataclass(value) and not isinstance(value, type):
         return {
-            type(value).__name__: {
-                each.name: _mark(getattr(value, each.name)) for each in fields(value) if each.compare
-            }
+            type(value).__name__: {each.name: mark(getattr(value, each.name)) for each in fields(value) if each.compare}
         }
     if callable(value):
         # without the module: a script is __main__ when it is run and has a name when it is imported
