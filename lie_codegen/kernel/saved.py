@@ -122,8 +122,8 @@ def _encoded(value: Any, arrays: dict[str, Array], where: str) -> Any:
         return {"definition": json.loads(own.text)}
     if isinstance(value, Mapping):
         return {"mapping": [[str(k), _encoded(v, arrays, f"{where}[{k!r}]")] for k, v in value.items()]}
-    if hasattr(type(value), "__dataclass_fields__") and type(value).__module__.split(".")[0] == "lie_codegen":
-        kept = [f.name for f in fields(value) if _is_kept(f)]
+    kept = _kept_names(type(value))
+    if kept is not None and type(value).__module__.split(".")[0] == "lie_codegen":
         held = {name: _encoded(getattr(value, name), arrays, f"{where}.{name}") for name in kept}
         return {"record": _name_of(type(value)), "fields": held}
     if type(value).__module__.startswith("sympy."):
@@ -131,9 +131,15 @@ def _encoded(value: Any, arrays: dict[str, Array], where: str) -> Any:
     raise InputError(f"{where} cannot be saved: {type(value).__name__} is no data")
 
 
-def _is_kept(field: Any) -> bool:
-    """A field that the constructor takes and that does not follow from the others (metadata: {"derived": True})."""
-    return bool(field.init) and not field.metadata.get("derived")
+def _kept_names(kind: type) -> tuple[str, ...] | None:
+    """What is kept of a value of that class, and what its constructor takes; None where it is no record of data.
+
+    Fields of a dataclass, those left out that follow from the others (metadata: {"derived": True}); an array with more to it
+    than its entries lists its attributes in SAVED.
+    """
+    if hasattr(kind, "__dataclass_fields__"):
+        return tuple(field.name for field in fields(kind) if field.init and not field.metadata.get("derived"))
+    return getattr(kind, "SAVED", None)
 
 
 def _formula(value: Any, where: str) -> dict[str, Any]:
@@ -196,8 +202,7 @@ def _record(record: dict[str, Any], arrays: Mapping[str, Array], path: str) -> A
     if "formula" in record:
         return _read_formula(record)
     made = _class_of(record["record"], path, enum=False)
-    known = {field.name for field in fields(made) if _is_kept(field)}
-    unknown = sorted(set(record["fields"]) - known)
+    unknown = sorted(set(record["fields"]) - set(_kept_names(made) or ()))
     if unknown:
         raise InputError(f"{path}: a {made.__name__} has no {', '.join(unknown)}; was it written by a later version?")
     held = {name: _decoded(each, arrays, path) for name, each in record["fields"].items()}
@@ -214,7 +219,7 @@ def _class_of(name: str, path: str, *, enum: bool) -> Any:
         found = getattr(import_module(module), attribute)
     except (ImportError, AttributeError):
         raise InputError(f"{path} names {name!r}, which this version does not have") from None
-    fits = isinstance(found, type) and (issubclass(found, Enum) if enum else hasattr(found, "__dataclass_fields__"))
+    fits = isinstance(found, type) and (issubclass(found, Enum) if enum else _kept_names(found) is not None)
     if not fits:
         raise InputError(f"{path} names {name!r}, which is no value of this package")
     return found

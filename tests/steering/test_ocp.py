@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -245,7 +246,7 @@ def test_a_weakly_active_bound_makes_a_sensitivity_one_sided() -> None:
             plan.sensitivity("q")
 
 
-def test_plans_are_values() -> None:
+def test_plans_are_values(tmp_path: Path) -> None:
     plan = regulator().solve(rotation((0, 1, 0)), q=1.0, starts=3)
     again = regulator().solve(rotation((0, 1, 0)), q=1.0, starts=3)
     assert plan == again
@@ -254,6 +255,20 @@ def test_plans_are_values() -> None:
     assert len(repr(plan).splitlines()) <= 10
     np.testing.assert_array_equal(plan.u(0.05), plan.u[0])
     np.testing.assert_array_equal(plan.u([0.15, 3.99]), plan.u[[1, 39]])
+    back = lc.load(plan.save(tmp_path / "plan.npz"))
+    assert back == plan
+    np.testing.assert_array_equal(back.u(3.99), plan.u[39])
+    assert regulator().solve(rotation((0, 1, 0)), q=1.0, guess=back).iterations <= 2
+    with pytest.raises(InputError, match=r"velocity.* cannot be saved: function"):
+        quadrotor().solve(**QUADROTOR).save(tmp_path / "quadrotor.npz")
+
+
+def test_a_plan_of_steer_keeps_the_plan_of_its_problem_in_a_file(tmp_path: Path) -> None:
+    plan = lc.steer(SO3, rotation((0, 0, 1)), SO3.labels, 2.0, cost="norm2(u)", intervals=8)
+    back = lc.load(plan.save(tmp_path / "plan.npz"))
+    assert back == plan
+    assert back.details["plan"] == plan.details["plan"]
+    np.testing.assert_array_equal(back.u(0.7), plan.u(0.7))
 
 
 def test_no_parameter_no_state_and_no_guess_builds_anything(compiles: list[str]) -> None:

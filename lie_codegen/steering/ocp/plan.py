@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
-from lie_codegen.values import Value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OptimalPlan(Value):
+class OptimalPlan(Saved):
     """A solution of an optimal control problem.
 
     Attributes:

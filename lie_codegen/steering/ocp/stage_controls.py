@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,9 @@ class StageControls(np.ndarray[Any, Any]):
         duration: of all intervals together [s].
     """
 
+    #: What `lie_codegen.kernel.saved` keeps of it.
+    SAVED: ClassVar[tuple[str, ...]] = ("values", "duration")
+
     duration: float
 
     def __new__(cls, values: ArrayLike, duration: float) -> StageControls:
@@ -29,6 +32,11 @@ class StageControls(np.ndarray[Any, Any]):
         """A view or a result of arithmetic keeps the duration of what it came from."""
         self.duration = getattr(other, "duration", 1.0)
 
+    @property
+    def values(self) -> Array:
+        """(N, m) as a plain array."""
+        return np.asarray(self)
+
     def __call__(self, t: ArrayLike) -> Array:
         """u at t: (m,) for a number, (k, m) for (k,) times; the first and the last value before and after."""
         times = np.asarray(t, dtype=float)
@@ -37,4 +45,4 @@ class StageControls(np.ndarray[Any, Any]):
 
     def __reduce__(self) -> Any:
         """Values and duration."""
-        return StageControls, (np.asarray(self), self.duration)
+        return StageControls, (self.values, self.duration)
