@@ -849,7 +849,7 @@ static void inner(task *s, real tolerance, int most)
     workspace *w = s->w;
     real M = merit(s, w->x, w->u), shift = 0;
     int failures = 0;
-    while (w->iterations < most) {
+    while (w->iterations < most && !w->stop) {
         const real before = M, size = 1 + (M > 0 ? M : -M);
         const int was_exact = s->exact;
         const int done = iterate(s, &M, &shift, OCP_EPSILON * size);
@@ -908,7 +908,7 @@ int OCP_(solve)(workspace *w, const real *p, ptrdiff_t stride, real t0, real tol
         if (w->violation <= allowed && loose <= tolerance) {
             break;
         }
-        if (w->iterations >= most) {
+        if (w->iterations >= most || w->stop) {
             break;
         }
         if (!(w->violation <= allowed)) {
@@ -927,7 +927,7 @@ int OCP_(solve)(workspace *w, const real *p, ptrdiff_t stride, real t0, real tol
     } else if (!(w->violation <= allowed)) {
         w->status = OCP_NOT_ADMISSIBLE;
     } else {
-        w->status = round < outer && w->iterations < most && stuck < 3 ? OCP_SOLVED : OCP_ADMISSIBLE;
+        w->status = round < outer && w->iterations < most && !w->stop && stuck < 3 ? OCP_SOLVED : OCP_ADMISSIBLE;
     }
     return w->status;
 }

@@ -19,7 +19,10 @@ WORK = {
     "sampled": "lc.closed_loop('so3', law=law, inertia=(1, 2, 3), runs=20000, t=t, sample=0.01, noise={'X': 1e-3})",
     "continuous": "lc.closed_loop('so3', law=law, inertia=(1, 2, 3), xi0=np.ones((20000, 3)), t=t, step=0.01)",
     "direct": "lc.steer('so3', (0.1, 0.2, 0.3), ('w1', 'w2'), 1.0, method='direct', starts=200000, bounds=30)",
+    "ocp": "long.solve(goal=goal, starts=4000, tolerance=0.0)",
 }
+#: Seconds before the key is pressed.
+WAITS = {"sampled": "8", "continuous": "8", "ocp": "1"}
 SETUP = """
 import os, signal, threading, time
 import numpy as np
@@ -31,6 +34,10 @@ many = np.tile(np.eye(3), (20000, 1, 1))
 step = lc.build(lc.rkmk4_step("so3")).rkmk4_step
 step.scan_batch(many[:9], u, u, u, 1e-3, n=10)
 law = lc.attitude_law("pd", inertia=(1, 2, 3), k_p=4, k_d=6)
+long = lc.ocp("se2", controls=("omega", "vx"), duration=1.0, intervals=800, stage_cost="norm2(u)", target="goal")
+goal = np.array([[0, -1, 0.1], [1, 0, 2], [0, 0, 1]])
+if NAME == "ocp":
+    long.machine()
 sent = []
 
 def interrupt():
@@ -49,7 +56,11 @@ except KeyboardInterrupt:
 @pytest.mark.skipif(os.name != "posix" or not hasattr(signal, "SIGINT"), reason="signals of POSIX")
 @pytest.mark.parametrize("work", WORK)
 def test_of_long_work(work: str, repository: Path) -> None:
-    code = SETUP.replace("WORK", WORK[work]).replace("WAIT", "8" if work in ("sampled", "continuous") else "4")
+    code = (
+        SETUP.replace("NAME", repr(work))
+        .replace("WORK", WORK[work])
+        .replace("WAIT", WAITS.get(work, "4"))
+    )
     environment = {**os.environ, "PYTHONPATH": str(repository)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == 0, done.stderr

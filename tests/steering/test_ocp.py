@@ -312,7 +312,7 @@ def test_without_a_compiler_numpy_does_the_same(make: Any, monkeypatch: pytest.M
     monkeypatch.setattr(
         import_module("lie_codegen.steering.ocp.problem"), "machine_of", lambda data, second_order: machine
     )
-    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.problem"), "_MORE", 0)
+    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.search"), "_MORE", 0)
     twin = problem.solve(first, iterations=most, **values)
     assert twin.iterations == compiled.iterations or compiled.status is not Status.SOLVED
     if compiled.status is Status.SOLVED:
@@ -325,7 +325,7 @@ def test_the_interpreted_step_of_the_car_after_few_iterations_is_the_compiled_on
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem = car()
-    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.problem"), "_MORE", 0)
+    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.search"), "_MORE", 0)
     compiled = problem.solve(goal=planar(0.8, 3, 1), iterations=5)
     machine = InterpretedMachine(problem.data, ModelBuilder(problem.data).build(second_order=True))
     monkeypatch.setattr(

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.elements import group_element
+from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.machine import loop_machine
-from lie_codegen.steering.ocp.problem import OptimalControlProblem, pack_element, unpack_elements
+from lie_codegen.steering.ocp.problem import OptimalControlProblem
 
 #: plant(X, states, u, t, h, rng) -> (X, states) an interval later.
 Plant = Callable[..., tuple[ArrayLike, Mapping[str, ArrayLike]]]

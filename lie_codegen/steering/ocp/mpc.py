@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.steering.ocp.elements import pack_element
 from lie_codegen.steering.ocp.loop import LoopRun, run_loop
 from lie_codegen.steering.ocp.machine import CompiledMachine, loop_machine
 from lie_codegen.steering.ocp.machine_base import HELD, INPUT, OK
 from lie_codegen.steering.ocp.plan import OptimalPlan
-from lie_codegen.steering.ocp.problem import OptimalControlProblem, pack_element
+from lie_codegen.steering.ocp.problem import OptimalControlProblem
 
 if TYPE_CHECKING:
     from lie_codegen.steering.ocp.machine_base import Machine

@@ -16,9 +16,9 @@ from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.write import GENERATOR
 from lie_codegen.errors import CodegenError
 from lie_codegen.steering.ocp.budget import Budget, budget_of
+from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
 from lie_codegen.steering.ocp.plan import OptimalPlan
-from lie_codegen.steering.ocp.problem import pack_element, unpack_elements
 from lie_codegen.steering.ocp.source import CORE, SolverView, render_solver, solver_view
 
 _SAMPLES = 6

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import operator
-import os
 import time
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,38 +12,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.flow.elements import group_element
-from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.runtime.patience import shows_progress
+from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.end import end_error
 from lie_codegen.steering.ocp.free_duration import best_duration
 from lie_codegen.steering.ocp.machine import machine_of
-from lie_codegen.steering.ocp.machine_base import EXACT_AT_ONCE, GAUSS_NEWTON, Machine
+from lie_codegen.steering.ocp.machine_base import Machine
 from lie_codegen.steering.ocp.plan import OptimalPlan
-from lie_codegen.steering.ocp.problem_data import Affine, ProblemData
+from lie_codegen.steering.ocp.problem_data import ProblemData
+from lie_codegen.steering.ocp.search import Options, Search
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
 
 _STATUS = (Status.SOLVED, Status.ADMISSIBLE, Status.NOT_ADMISSIBLE, Status.DIVERGED)
-_SPREAD = 0.3
-_PENALTY = 10.0
-_OUTER = 25
-#: Further starts where none of those asked for is admissible.
-_MORE = 8
-
-
-@dataclass(frozen=True)
-class _Search:
-    """The options of `solve`."""
-
-    starts: int
-    seed: int
-    threads: int | None
-    tolerance: float
-    allowed: float
-    iterations: int
-    curvature: bool
 
 
 @dataclass(frozen=True)
@@ -117,48 +98,24 @@ class OptimalControlProblem:
             if not (isinstance(value, int | float | np.number) and 0 <= value < np.inf):
                 raise InputError(f"{where}: {what} must be a number of at least 0, got {value!r}")
         free = self.data.free_duration
-        search = _Search(count, seed, threads, tolerance, allowed, iterations, curvature)
+        options = Options(count, seed, threads, tolerance, allowed, iterations, curvature)
         if free is None:
-            x0, rows = self.start(X0, values, where)
-            return self._search(x0, rows, guess, search, where)
+            return self._best(*self.start(X0, values, where), guess, options, where)
         first = guess.duration if isinstance(guess, OptimalPlan) else float(np.sqrt(free[0] * free[1]))
         x0, rows = self.start(X0, {**values, "T": first}, where)
 
         def at(T: float, near: Any) -> OptimalPlan:
             x0[-1] = T
-            again = search if near is guess else replace(search, starts=1)
-            return self._search(x0, rows, near, again, where)
+            return self._best(x0, rows, near, options if near is guess else replace(options, starts=1), where)
 
         return best_duration(at, first, free, guess)
 
-    def _search(self, x0: Array, rows: Array, guess: Any, search: _Search, where: str) -> OptimalPlan:
-        """The best of several starts."""
-        guesses = _several(guess)
-        firsts = [self._guess(each, where) for each in guesses]
-        count = max(search.starts, len(guesses))
-        machine = self.machine(second_order=search.curvature)
+    def _best(self, x0: Array, rows: Array, guess: Any, options: Options, where: str) -> OptimalPlan:
+        """The plan of the best start."""
+        machine = self.machine(second_order=options.curvature)
         began = time.perf_counter()
-
-        def run(number: int) -> Array:
-            which = number % len(guesses)
-            noise = number >= len(guesses)
-            space = self._workspace(machine, x0, rows, firsts[which], guesses[which], number if noise else 0, search)
-            machine.solve(space, rows, 0.0, search.tolerance, search.allowed, _OUTER, search.iterations)
-            return space
-
-        lanes = search.threads if search.threads is not None else os.cpu_count() or 1
-        spaces = _in_lanes(run, range(count), lanes if machine.compiled else 1)
-        best = min(spaces, key=_rank)
-        if _rank(best)[0] > 0:
-            # one start may be caught in a corner between conditions: others are tried before it is said that none was found
-            spaces += _in_lanes(run, range(count, count + _MORE), lanes if machine.compiled else 1)
-            best = min(spaces, key=_rank)
-        if int(best["status"][0]) < 3:
-            kept = best.copy()
-            machine.gains(kept, rows, 0.0)
-            best["K"], best["P"], best["v"] = kept["K"], kept["P"], kept["v"]
-        tried = np.array([[space["cost"][0], space["violation"][0]] for space in spaces])
-        return self.plan(machine, best, rows, tried, time.perf_counter() - began)
+        space, tried = Search(self.data, machine, x0, rows, options, where).best(guess)
+        return self.plan(machine, space, rows, tried, time.perf_counter() - began)
 
     def start(self, X0: ArrayLike | None, values: Mapping[str, ArrayLike], where: str) -> tuple[Array, Array]:
         """The first state as stored, and the rows of the parameters."""
@@ -173,67 +130,6 @@ class OptimalControlProblem:
         z = data.states.rows(states, 1, where)[0]
         rows = data.parameters.rows(rest, data.intervals + 1, where)
         return np.concatenate([pack_element(data, element), z]), np.ascontiguousarray(rows)
-
-    def _guess(self, guess: Any, where: str) -> Array | None:
-        """(N, m) controls, or None."""
-        data = self.data
-        shape = (data.intervals, data.inputs.size)
-        if guess is None:
-            return None
-        if isinstance(guess, OptimalPlan):
-            guess = np.asarray(guess.u)
-        elif callable(getattr(guess, "u", None)):
-            guess = self._sampled(guess, where)
-        try:
-            array = np.asarray(guess, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{where}: guess is neither a plan nor controls: {guess!r:.60}") from None
-        if array.shape not in (shape, shape[1:]):
-            raise ShapeError(f"{where}: guess has shape {array.shape}; controls are {shape}")
-        if not np.isfinite(array).all():
-            raise NotFiniteError(f"{where}: guess holds NaN or infinity")
-        return np.array(np.broadcast_to(array, shape))
-
-    def _sampled(self, plan: Any, where: str) -> Array:
-        """Controls of a plan of `lc.steer` in the middle of each interval: its velocities as this problem's controls.
-
-        Raises:
-            InputError: xi is no combination of this problem's controls.
-        """
-        law = self.data.velocity
-        if not isinstance(law, Affine):
-            raise InputError(
-                f"{where}: a plan of steer says velocities; it is a guess only where controls are velocities"
-            )
-        middles = (np.arange(self.data.intervals) + 0.5) * (plan.duration / self.data.intervals)
-        velocities = np.asarray(plan.u(middles), dtype=float) * (plan.duration / self.data.duration)
-        return np.asarray((velocities - np.array(law.drift)) @ np.linalg.pinv(np.array(law.columns)).T)
-
-    def _workspace(
-        self,
-        machine: Machine,
-        x0: Array,
-        rows: Array,
-        first: Array | None,
-        guess: Any,
-        number: int,
-        search: _Search,
-    ) -> Array:
-        space = machine.workspace()
-        space["x"][0, 0] = x0
-        space["rho"], space["curvature"] = _PENALTY, int(search.curvature)
-        if first is None:
-            machine.first_guess(space, rows, 0.0)
-        else:
-            space["u"][0] = first
-        if isinstance(guess, OptimalPlan) and number == 0 and guess.multipliers.shape == space["lambda"][0].shape:
-            space["lambda"][0], space["lambda_end"][0] = guess.multipliers, guess.end_multipliers
-            space["rho"] = guess.penalty
-            space["curvature"] = EXACT_AT_ONCE if search.curvature else GAUSS_NEWTON
-        if number:
-            noise = np.random.default_rng((search.seed, number)).normal(size=space["u"][0].shape)
-            space["u"][0] += _SPREAD * noise
-        return space
 
     def plan(self, machine: Machine, space: Array, rows: Array, tried: Array, seconds: float) -> OptimalPlan:
         """The plan that a workspace holds."""
@@ -274,29 +170,6 @@ class OptimalControlProblem:
         return machine.row_names[row], stage
 
 
-def _several(guess: Any) -> list[Any]:
-    """The guesses of a list of plans (None among them for the one that the solver makes), or the one there is."""
-    if isinstance(guess, list | tuple) and any(each is None or callable(getattr(each, "u", None)) for each in guess):
-        return list(guess)
-    return [guess]
-
-
-def _in_lanes(run: Callable[[int], Array], numbers: Iterable[int], lanes: int) -> list[Array]:
-    chosen = list(numbers)
-    if lanes == 1 or len(chosen) <= 1:
-        return [run(number) for number in chosen]
-    with ThreadPoolExecutor(min(lanes, len(chosen))) as pool:
-        return list(pool.map(run, chosen))
-
-
-def _rank(space: Array) -> tuple[int, float]:
-    """Admissible ones by cost, the others behind them by violation."""
-    status = int(space["status"][0])
-    if status <= 1:
-        return 0, float(space["cost"][0])
-    return status, float(space["violation"][0])
-
-
 def _at_least_one(value: Any, what: str, where: str) -> int:
     try:
         count = operator.index(value)
@@ -305,21 +178,3 @@ def _at_least_one(value: Any, what: str, where: str) -> int:
     if count < 1:
         raise InputError(f"{where}: {what} must be a whole number of at least 1, got {value!r}")
     return count
-
-
-def pack_element(data: ProblemData, X: Array) -> Array:
-    """The varying entries of an element, complex ones as re, im."""
-    rows, columns = np.array(varying_entries(data.group)).T
-    entries = np.ascontiguousarray(X[rows, columns])
-    return entries.astype(complex).view(float) if data.group.is_complex else entries.real.astype(float)
-
-
-def unpack_elements(data: ProblemData, x: Array) -> tuple[Array, Array]:
-    """(k, d, d) elements and (k, q) other states of (k, stored) states."""
-    group = data.group
-    rows, columns = np.array(varying_entries(group)).T
-    size = len(rows) * (2 if group.is_complex else 1)
-    entries = np.ascontiguousarray(x[:, :size])
-    X = np.tile(np.eye(group.degree, dtype=complex if group.is_complex else float), (len(x), 1, 1))
-    X[:, rows, columns] = entries.view(complex) if group.is_complex else entries
-    return X, np.ascontiguousarray(x[:, size:])
