@@ -56,11 +56,7 @@ except KeyboardInterrupt:
 @pytest.mark.skipif(os.name != "posix" or not hasattr(signal, "SIGINT"), reason="signals of POSIX")
 @pytest.mark.parametrize("work", WORK)
 def test_of_long_work(work: str, repository: Path) -> None:
-    code = (
-        SETUP.replace("NAME", repr(work))
-        .replace("WORK", WORK[work])
-        .replace("WAIT", WAITS.get(work, "4"))
-    )
+    code = SETUP.replace("NAME", repr(work)).replace("WORK", WORK[work]).replace("WAIT", WAITS.get(work, "4"))
     environment = {**os.environ, "PYTHONPATH": str(repository)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == 0, done.stderr

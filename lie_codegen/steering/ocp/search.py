@@ -92,7 +92,7 @@ class Search:
                 run(space)
             return spaces
         # compiled code hears no signal: it runs beside the thread that does, which tells it to stop
-        with ThreadPoolExecutor(min(lanes, len(spaces))) as pool:
+        with ThreadPoolExecutor(max(1, min(lanes, len(spaces)))) as pool:
             waiting = [pool.submit(run, space) for space in spaces]
             try:
                 for each in waiting:
