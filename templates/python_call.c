@@ -21,6 +21,12 @@
 #define MOST_PORTS 32
 #define PIECES_FROM (1 << 20) /* samples from which Python takes pieces, and looks in between whether to stop */
 #define RELEASE_FROM 32 /* samples from which giving up the interpreter lock pays */
+#define SPARE 2 /* results a port keeps: the one that the caller still holds, and the next one */
+#ifdef Py_GIL_DISABLED
+#define SPARE_MOST 0 /* a count of references says nothing there */
+#else
+#define SPARE_MOST 512 /* doubles in a result that is kept */
+#endif
 
 typedef struct {
     int ndim;
@@ -29,6 +35,8 @@ typedef struct {
     npy_intp size; /* doubles */
     PyArray_Descr *descr;
     PyObject *name;
+    PyObject *spare[SPARE]; /* results of earlier calls; one that nobody else holds is written to again */
+    int turn;               /* the spare that the next new result replaces */
 } Port;
 
 typedef void (*call_function)(const double *const *, double *const *);
@@ -43,6 +51,8 @@ typedef struct {
     PyObject *owner;      /* answers for every other attribute */
     PyObject *samples;    /* the batched form, or NULL */
     PyTypeObject *result; /* type of several outputs, a tuple without fields of its own; or NULL */
+    PyObject *spare[SPARE]; /* tuples of earlier calls */
+    int turn, keeps;        /* whether there are any: not of batches, nor of large results */
     int n_in, n_out;
     Port ports[MOST_PORTS];
 } Function;
@@ -116,11 +126,85 @@ static int bind(const Function *self, PyObject *const *args, Py_ssize_t nargs, P
     return missing == 0;
 }
 
-static PyObject *several(const Function *self, PyObject **outputs)
+static void keep(PyObject **spare, int *turn, PyObject *object)
+{
+    Py_XSETREF(spare[*turn], Py_NewRef(object));
+    *turn = (*turn + 1) % SPARE;
+}
+
+static inline PyObject *new_array(const Port *port, int ndim, npy_intp *dims)
+{
+    Py_INCREF(port->descr);
+    return pool_array(port->descr, ndim, dims, port->is_complex ? 2 * sizeof(double) : sizeof(double));
+}
+
+/*
+ * The array of one result: making one and letting it go costs more than most kernels. With one reference, ours, there is no
+ * view, no buffer and no name that could see it written; a weak reference could, and the rest is what its holder
+ * may have changed in place.
+ */
+static PyObject *result_array(Port *port, int keeps)
+{
+    PyObject *array;
+    int k;
+    for (k = 0; k < SPARE; ++k) {
+        PyArrayObject *old = (PyArrayObject *)port->spare[k];
+        if (old != NULL && Py_REFCNT(old) == 1 && PyArray_DESCR(old) == port->descr
+            && fits(port, old, 0, NPY_ARRAY_CARRAY | NPY_ARRAY_OWNDATA)
+            && ((PyArrayObject_fields *)old)->weakreflist == NULL) {
+            return Py_NewRef(old);
+        }
+    }
+    array = new_array(port, port->ndim, port->dims);
+    if (array != NULL && keeps) {
+        keep(port->spare, &port->turn, array);
+    }
+    return array;
+}
+
+static PyObject *new_tuple(const Function *self)
 {
     PyObject *tuple = self->result->tp_alloc(self->result, self->n_out);
+#if PY_VERSION_HEX >= 0x030E0000
+    if (tuple != NULL) {
+        ((PyTupleObject *)tuple)->ob_hash = -1; /* not known yet */
+    }
+#endif
+    return tuple;
+}
+
+/* The empty tuple of a call's results: asked for before their arrays, since one that nobody holds any more lets go of its own. */
+static PyObject *result_tuple(Function *self)
+{
+    PyObject *tuple;
+    int k, i;
+    for (k = 0; k < SPARE; ++k) {
+        tuple = self->spare[k];
+        if (tuple != NULL && Py_REFCNT(tuple) == 1) {
+            Py_INCREF(tuple);
+            for (i = 0; i < self->n_out; ++i) {
+                PyObject *item = PyTuple_GET_ITEM(tuple, i);
+                PyTuple_SET_ITEM(tuple, i, NULL);
+                Py_XDECREF(item);
+            }
+#if PY_VERSION_HEX >= 0x030E0000
+            ((PyTupleObject *)tuple)->ob_hash = -1;
+#endif
+            return tuple;
+        }
+    }
+    tuple = new_tuple(self);
+    if (tuple != NULL && self->keeps) {
+        keep(self->spare, &self->turn, tuple);
+    }
+    return tuple;
+}
+
+/* The references to the outputs go into the tuple. */
+static PyObject *filled(PyObject *tuple, int n_out, PyObject **outputs)
+{
     int i;
-    for (i = 0; i < self->n_out; ++i) {
+    for (i = 0; i < n_out; ++i) {
         if (tuple == NULL) {
             Py_DECREF(outputs[i]);
         } else {
@@ -128,12 +212,6 @@ static PyObject *several(const Function *self, PyObject **outputs)
         }
     }
     return tuple;
-}
-
-static inline PyObject *new_array(const Port *port, int ndim, npy_intp *dims)
-{
-    Py_INCREF(port->descr);
-    return pool_array(port->descr, ndim, dims, port->is_complex ? 2 * sizeof(double) : sizeof(double));
 }
 
 /* Whether two ranges of memory share a byte. */
@@ -168,21 +246,24 @@ static int given(const Function *self, PyObject *out, int lead, npy_intp count, 
     return 1;
 }
 
-/* Arrays of the caller as the result. */
-static PyObject *kept(const Function *self, PyObject **outputs)
+/* Arrays of the caller as the result: a tuple of ours as it is, what an earlier call gave. */
+static PyObject *kept(Function *self, PyObject *out, PyObject **outputs)
 {
     int i;
+    if (self->result != NULL && Py_TYPE(out) == self->result) {
+        return Py_NewRef(out);
+    }
     for (i = 0; i < self->n_out; ++i) {
         Py_INCREF(outputs[i]);
     }
-    return self->result == NULL ? outputs[0] : several(self, outputs);
+    return self->result == NULL ? outputs[0] : filled(new_tuple(self), self->n_out, outputs);
 }
 
 static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t nargsf, PyObject *kwnames)
 {
     Function *self = (Function *)callable;
     const Py_ssize_t nargs = PyVectorcall_NARGS(nargsf);
-    PyObject *bound[MOST_PORTS], *outputs[MOST_PORTS], *out = NULL, *const *values = args;
+    PyObject *bound[MOST_PORTS], *outputs[MOST_PORTS], *out = NULL, *tuple = NULL, *const *values = args;
     const double *in[MOST_PORTS];
     double *to[MOST_PORTS], numbers[MOST_PORTS][2];
     int i;
@@ -211,7 +292,10 @@ static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t narg
             goto slowly;
         }
         self->call(in, to);
-        return kept(self, outputs);
+        return kept(self, out, outputs);
+    }
+    if (self->result != NULL && (tuple = result_tuple(self)) == NULL) {
+        return NULL;
     }
     for (i = 0; i < self->n_out; ++i) {
         Port *port = &self->ports[self->n_in + i];
@@ -220,7 +304,7 @@ static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t narg
             to[i] = numbers[i]; /* the kernel reads every input before it writes an output */
             continue;
         }
-        outputs[i] = new_array(port, port->ndim, port->dims);
+        outputs[i] = result_array(port, self->keeps);
         if (outputs[i] == NULL) {
             goto failed;
         }
@@ -240,11 +324,12 @@ static PyObject *call_one(PyObject *callable, PyObject *const *args, size_t narg
             }
         }
     }
-    return self->result == NULL ? outputs[0] : several(self, outputs);
+    return tuple == NULL ? outputs[0] : filled(tuple, self->n_out, outputs);
 failed:
     while (i-- > 0) {
         Py_XDECREF(outputs[i]);
     }
+    Py_XDECREF(tuple);
     return NULL;
 slowly:
     return PyObject_Vectorcall(self->slow, args, (size_t)nargs, kwnames);
@@ -329,7 +414,7 @@ static PyObject *call_batch(PyObject *callable, PyObject *const *args, size_t na
         self->batch(count, in, strides, to);
         PyEval_RestoreThread(state);
     }
-    return self->result == NULL ? outputs[0] : several(self, outputs);
+    return self->result == NULL ? outputs[0] : filled(new_tuple(self), self->n_out, outputs);
 slowly:
     return PyObject_Vectorcall(self->slow, args, (size_t)nargs, kwnames);
 }
@@ -377,6 +462,7 @@ static PyObject *make_function(PyObject *module, PyObject *args)
     unsigned long long call, batch;
     PyObject *inputs, *outputs, *slow, *owner, *samples, *result;
     Function *self;
+    int k;
     (void)module;
     if (!PyArg_ParseTuple(args, "KKO!O!OOOO", &call, &batch, &PyTuple_Type, &inputs, &PyTuple_Type, &outputs, &slow,
             &owner, &samples, &result)) {
@@ -407,36 +493,51 @@ static PyObject *make_function(PyObject *module, PyObject *args)
         Py_DECREF(self);
         return NULL;
     }
+    self->keeps = call != 0;
+    for (k = self->n_in; k < self->n_in + self->n_out; ++k) {
+        self->keeps = self->keeps && self->ports[k].size <= SPARE_MOST;
+    }
     return (PyObject *)self;
 }
 
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
     Function *self = (Function *)object;
+    int k;
     Py_VISIT(self->slow);
     Py_VISIT(self->owner);
     Py_VISIT(self->samples);
     Py_VISIT(self->result);
+    for (k = 0; k < SPARE; ++k) {
+        Py_VISIT(self->spare[k]);
+    }
     return 0;
 }
 
 static int clear(PyObject *object)
 {
     Function *self = (Function *)object;
+    int k;
     Py_CLEAR(self->slow);
     Py_CLEAR(self->owner);
     Py_CLEAR(self->samples);
     Py_CLEAR(self->result);
+    for (k = 0; k < SPARE; ++k) {
+        Py_CLEAR(self->spare[k]);
+    }
     return 0;
 }
 
 static void destroy(PyObject *object)
 {
     Function *self = (Function *)object;
-    int i;
+    int i, k;
     PyObject_GC_UnTrack(object);
     clear(object);
     for (i = 0; i < MOST_PORTS; ++i) {
+        for (k = 0; k < SPARE; ++k) {
+            Py_XDECREF(self->ports[i].spare[k]);
+        }
         Py_XDECREF(self->ports[i].descr);
         Py_XDECREF(self->ports[i].name);
     }

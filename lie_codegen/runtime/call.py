@@ -77,7 +77,8 @@ class Compiled(Generic[Result]):
             **named: inputs by name.
 
         Returns:
-            The output; a Python number if it is a scalar; a named tuple if there are several.
+            The output; a Python number if it is a scalar; a named tuple if there are several. An array that the caller has let
+            go is written to by a later call (so `ndarray.resize` of a result wants `refcheck=False`).
 
         Raises:
             ShapeError: naming the argument, what was expected and what was given.
@@ -279,7 +280,7 @@ class Compiled(Generic[Result]):
 
     def _wrap(self, outputs: list[Array], out: Any, *, scalars: bool) -> Any:
         if out is not None:
-            return out if self.result_type is None else self.result_type(*outputs)
+            return out if self.result_type in (None, type(out)) else self.result_type(*outputs)
         values = [array.item() if scalars and array.ndim == 0 else array for array in outputs]
         return values[0] if self.result_type is None else self.result_type(*values)
 
