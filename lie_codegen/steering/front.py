@@ -19,6 +19,7 @@ from lie_codegen.runtime.patience import shows_progress
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.front import asks_direct, direct_plan
 from lie_codegen.steering.feedback import feedback
+from lie_codegen.steering.goal_plans import set_plan
 from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by
 from lie_codegen.steering.ocp.steered import asks_open, open_plan
@@ -263,12 +264,10 @@ def _planned(
 ) -> Plan:
     if asks_open(method, options):
         return open_plan(group, target, controls, duration, tolerance, **options)
-    if isinstance(target, GoalSet) and method not in ("auto", "direct", "ocp"):
-        raise SteeringInputError(
-            f"steer: a {type(target).__name__} is a set of goals, which method='direct' takes, not {method!r}"
-        )
     if asks_direct(method, target, controls, options):
         return direct_plan(group, target, controls, duration, tolerance, options)
+    if isinstance(target, GoalSet):
+        return set_plan(group, target, controls, duration, method, tolerance, options)
     if method == "symmetric_product" and options.get("start") is None:
         return symmetric_product_plan(group, target, controls, duration, tolerance, options)
     if options.get("start") is not None:

@@ -141,6 +141,47 @@ def end_of(group: MatrixGroup, target: Any, where: str) -> End:
     return _element_end(group, group_element(group, target, where)[None], none, none)
 
 
+def cosets(group: MatrixGroup, target: Any, where: str) -> tuple[Array, Array]:
+    """The same goal as right cosets: elements T (variants, d, d) and directions F (k, n) so that X is at the goal where it is in
+    T exp(hat(span F)) for one of the T.
+
+    A left coset exp(h) T is T exp(Ad_T^-1 h); X e = v is kept by the motions with hat(h) e = 0.
+
+    Raises:
+        As `end_of`.
+    """
+    end = end_of(group, target, where)
+    if end.elements is None:
+        slopes = np.array([(A @ end.right).ravel() for A in group.basis])
+        _, sizes, across = np.linalg.svd(slopes.T)
+        rank = int(np.sum(sizes > 1e-12 * max(1.0, float(sizes[0]))))
+        return _begin(group, end, where)[None], across[rank:]
+    turned = [group.project(np.linalg.solve(end.elements[0], group.hat(h) @ end.elements[0])) for h in end.before]
+    return end.elements, np.array([*turned, *end.after]).reshape(-1, group.dim)
+
+
+def _begin(group: MatrixGroup, end: End, where: str) -> Array:
+    """An element with L X R = value for one column R: the shortest turn or the shift that takes one to the other."""
+    column, value = end.right[:, 0], end.values[0][:, 0] / np.max(np.abs(end.left))
+    X, p = np.eye(group.degree), len(value)
+    if column[-1] == 1 and has_positions(group):
+        X[:p, -1] = value
+    else:
+        X[:p, :p] = _turn(column[:p], value)
+    return group_element(group, X, where)
+
+
+def _turn(a: Array, b: Array) -> Array:
+    """The rotation in the plane of two unit vectors that takes a to b; half a turn in any plane where b = -a."""
+    eye = np.eye(len(a))
+    if 1 + a @ b > 1e-9:
+        return np.asarray(eye - np.outer(a + b, a + b) / (1 + a @ b) + 2 * np.outer(b, a))
+    least = int(np.argmin(np.abs(a)))
+    across = eye[least] - a[least] * a
+    across = across / np.linalg.norm(across)
+    return np.asarray(eye - 2 * np.outer(a, a) - 2 * np.outer(across, across))
+
+
 def _element_end(
     group: MatrixGroup, elements: Array, before: Array, after: Array, phases: tuple[float, ...] = ()
 ) -> End:

@@ -14,6 +14,7 @@ from lie_codegen.algebra.controllability import Controllability, control_indices
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
+from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.identifiers import shown
@@ -35,6 +36,7 @@ class Task:
         duration: seconds.
         tolerance: endpoint error below which a plan counts as solved.
         report: the controllability of the controls; not controllable alone where a drift, or inertia, makes up for it.
+        free: (k, n) directions of the algebra the goal leaves free: the end is in target exp(hat(their span)).
     """
 
     group: MatrixGroup
@@ -43,6 +45,18 @@ class Task:
     duration: float
     tolerance: float
     report: Controllability
+    free: Array | None = field(default=None, repr=False)
+
+    @property
+    def freedom(self) -> int:
+        """k, how many directions are free; zero where the goal is an element."""
+        return 0 if self.free is None else len(self.free)
+
+    def moved(self, h: Array) -> Array:
+        """(d, d) target exp(hat(sum_i h_i free_i)): another element of the goal, which is as good."""
+        if self.free is None:
+            return self.target
+        return np.asarray(self.target @ expm(self.group.hat(h @ self.free)))
 
 
 def check_duration(duration: object, where: str) -> None:

@@ -49,7 +49,7 @@ def test_gates_of_seven_digits_are_taken_for_the_unitary_ones() -> None:
 
 def test_sets_of_goals_are_refused_by_methods_for_elements() -> None:
     with pytest.raises(lc.errors.SteeringInputError, match="set of goals"):
-        lc.steer(lc.group("se2"), lc.Position((0, 1)), ("omega", "vx"), 1.0, method="optimal")
+        lc.steer(lc.group("se2"), lc.Position((0, 1)), ("omega", "vx"), 1.0, method="loops")
     with pytest.raises(lc.errors.SteeringInputError, match="Position"):
         lc.steer(lc.group("so3"), lc.Position((0, 1)), ("w1", "w2"), 1.0)
     with pytest.raises(lc.errors.ShapeError, match="Pointing"):

@@ -25,8 +25,10 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
     if method != "auto":
         return method == "direct"
     given = {name for name, value in options.items() if value is not None}
-    if isinstance(target, GoalSet) or given & _OWN or options.get("objective") == "fuel":
+    if given & _OWN or options.get("objective") == "fuel":
         return True
+    if isinstance(target, GoalSet):
+        return given <= _options()  # what it has no option for goes to a method that moves along the set
     if given & {"start", "guess"} and given <= _options():
         return True
     if any(not isinstance(each, str | int | np.integer) for each in controls) or callable(options.get("drift")):

@@ -35,7 +35,9 @@ def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Se
 
 def ends_in_obstacles(task: Task, numbers: Numbers) -> list[str]:
     """The ends and the via points that lie inside an obstacle."""
-    places = [("start", np.eye(task.group.degree)), ("target", task.target)]
+    places = [("start", np.eye(task.group.degree))]
+    if not task.freedom:
+        places.append(("target", task.target))
     places += [(f"via point {number}", element) for number, element in enumerate(numbers.via, start=1)]
     return [
         f"the {which} itself is inside {name}"

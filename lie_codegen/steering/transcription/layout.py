@@ -12,6 +12,8 @@ from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.structure import Structure
 
 _RELAXED = 1.05e-8
+#: Most of a free motion in one solve: its exponential is a short polynomial, and the goal moves along afterwards.
+_FREE = 1.0
 
 
 def unpack_elements(structure: Structure, packed: Array, *, of_difference: bool = False) -> Array:
@@ -32,6 +34,21 @@ def unpacked(structure: Structure, solution: Array) -> tuple[Array, float]:
     first, last = structure.variable_ranges["v"]
     duration = float(stages[0, structure.variable_ranges["s"][0]]) if structure.free_time else 1.0
     return stages[:, first:last], duration
+
+
+def free_motion(structure: Structure, solution: Array) -> Array:
+    """(k,) h of a solution: how far along the goal's free directions it ends."""
+    first, last = structure.variable_ranges["h"]
+    return stages_of(structure, solution)[0][-1, first:last]
+
+
+def at_rest(structure: Structure, solution: Array) -> Array:
+    """The solution with h = 0, for a target that was moved by h."""
+    table = np.zeros((structure.intervals + 1) * structure.width)
+    table[: structure.variables] = solution
+    first, last = structure.variable_ranges["h"]
+    table.reshape(-1, structure.width)[:, first:last] = 0
+    return table[: structure.variables]
 
 
 def joined(structure: Structure, states: Array, xi: Array | None, v: Array, scale: float) -> Array:
@@ -73,6 +90,7 @@ def variable_limits(structure: Structure, numbers: Numbers, end_velocity: Array)
         limit("xi", 0, (second.ends[0], second.ends[0]))
         limit("xi", N, (end_velocity, end_velocity))
     limit("v", slice(None), numbers.bounds)
+    limit("h", slice(None), (-_FREE, _FREE))
     if numbers.rest:
         limit("v", [0, N], (0.0, 0.0))
     if structure.free_time:

@@ -6,8 +6,10 @@ from typing import Any
 
 import casadi as ca
 
-from lie_codegen.groups.maps.element_pattern import unpack
+from lie_codegen.groups.maps.element_pattern import pack, unpack
+from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import pushed
@@ -25,10 +27,11 @@ def path(structure: Structure, kind: str) -> Piece:
     at = symbols(structure)
     rows = []
     if kind in ("via", "last"):
-        rows.append(_miss(structure.group, at.goal, at.parts["X"]))
+        here = _without_free_motion(structure, at) if kind == "last" and structure.free else at.parts["X"]
+        rows.append(_miss(structure.group, at.goal, here))
         if structure.guarded:
-            rows.append(ca.dot(at.goal, at.parts["X"] - at.goal) + _WITHIN)
-    if kind in ("inner", "via"):
+            rows.append(ca.dot(at.goal, here - at.goal) + _WITHIN)
+    if structure.watched(kind):
         rows += _clearances(structure, at)
     if kind != "last" and structure.free_time:
         reach = at.parts["rates"] * at.parts["s"] / structure.intervals
@@ -49,6 +52,15 @@ def path(structure: Structure, kind: str) -> Piece:
 def _miss(group: MatrixGroup, goal: Any, X: Any) -> Any:
     """q_k = <goal A_k, X - goal>, zero, near the goal, only there: n equations, of full rank."""
     return ca.vertcat(*[ca.dot(pushed(group, goal, A), X - goal) for A in group.basis])
+
+
+def _without_free_motion(structure: Structure, at: Symbols) -> Any:
+    """pack(X exp(-hat(F h))): what must be the goal. h is small: the caller moves the goal along, see `refined`."""
+    group = structure.group
+    turn = -ca.reshape(at.parts["free"], group.dim, structure.free) @ at.parts["h"]
+    matrix = unpack(group, ca.vertsplit(at.parts["X"]))
+    moved = times_taylor_exp(group, CasadiArithmetic(), matrix, ca.vertsplit(turn))
+    return ca.vertcat(*[ca.SX(entry) for entry in pack(group, moved)])
 
 
 def _clearances(structure: Structure, at: Symbols) -> list[Any]:

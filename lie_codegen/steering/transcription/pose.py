@@ -64,6 +64,7 @@ def pose(task: Task, asked: Options) -> tuple[Structure, Numbers]:
         free_time=asked.objective == "time",
         second_order=second is not None,
         periodic=asked.periodic,
+        free=task.freedom,
     )
     numbers = Numbers(
         bounds=(low * unit, high * unit),

@@ -15,7 +15,15 @@ from lie_codegen.steering.obstacles.tunnels import tunnels
 from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.flow import Flight, fly
-from lie_codegen.steering.transcription.layout import stages_of, tightened, unpack_elements, unpacked, variable_limits
+from lie_codegen.steering.transcription.layout import (
+    at_rest,
+    free_motion,
+    stages_of,
+    tightened,
+    unpack_elements,
+    unpacked,
+    variable_limits,
+)
 from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.problem import Program
 from lie_codegen.steering.transcription.structure import Structure
@@ -27,6 +35,8 @@ _CLEAR = 1e-8
 _EXACT = 2e-9
 _PUSH = 1.1
 _ASTRAY = 1e-2
+#: Solves beyond the others in which the target moves along the goal's free directions, and the motion at which it stands still.
+_MOVES, _SETTLED = 12, 0.05
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,7 @@ class Candidate:
     Attributes:
         objective, values, duration: the objective, (N + 1, m) controls and the duration, in the task's units.
         violation: of the constraints by the program's answer, infinite if the end is missed.
+        target: (d, d) the element of the goal that it was to end at.
         miss: of the target by the true system, or how deep it cuts an obstacle.
         flight: of the true system; None where the program's conditions are not kept.
         solution: all variables.
@@ -69,6 +80,7 @@ class Candidate:
     values: Array
     duration: float
     violation: float
+    target: Array
     miss: float
     flight: Flight | None
     solution: Array
@@ -105,43 +117,51 @@ class Workbench:
 
 
 def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candidate:
-    """Solves, and again with the aim corrected by the true system's miss, and obstacles enlarged where the path cuts them."""
+    """Solves, and again with the aim corrected by the true system's miss, obstacles enlarged where the path cuts them, and the
+    target moved along the directions that the goal leaves free."""
     task, numbers = bench.task, bench.numbers
     second = numbers.dynamics
     aim, margins = first_aim, np.zeros(len(numbers.obstacles))
     solves: list[Solve] = []
     best: Candidate | None = None
-    for _ in range(_ROUNDS):
+    moving = False
+    for _ in range(_ROUNDS + (_MOVES if task.freedom else 0)):
         solution, solve = _solve(bench, name, margins, aim, start)
         solves.append(solve)
         values, duration = unpacked(bench.structure, solution)
+        h = free_motion(bench.structure, solution)
+        target = task.moved(h)
         if not solve.violation <= FEASIBLE:
             failed = Candidate(
-                solve.objective, values, duration, solve.violation, np.inf, None, solution, tuple(solves)
+                solve.objective, values, duration, solve.violation, target, np.inf, None, solution, tuple(solves)
             )
             return failed if best is None else replace(best, solves=tuple(solves))
         flight = fly(task.group, task.controls, numbers, values, duration)
         if tunnels(numbers.obstacles, flight.X):
             # through a seam between discs, in one fast step: to enlarge the discs would find the next seam
             tunnel = Candidate(
-                solve.objective, values, duration, solve.violation, np.inf, flight, solution, tuple(solves)
+                solve.objective, values, duration, solve.violation, target, np.inf, flight, solution, tuple(solves)
             )
             return tunnel if best is None else replace(best, solves=tuple(solves))
         cut = np.array([max(0.0, -float(np.min(each.clearance(flight.X)))) for each in numbers.obstacles])
-        relative = np.linalg.solve(flight.X[-1], task.target)
+        relative = np.linalg.solve(flight.X[-1], target)
         slip = np.zeros(task.group.dim) if second is None else second.ends[1] - flight.xi[-1]
         off = float(max(np.max(np.abs(relative - np.eye(task.group.degree))), np.max(np.abs(slip))))
         deepest = float(np.max(cut, initial=0.0))
+        miss = max(off, deepest)
         candidate = Candidate(
-            solve.objective, values, duration, solve.violation, max(off, deepest), flight, solution, tuple(solves)
+            solve.objective, values, duration, solve.violation, target, miss, flight, solution, tuple(solves)
         )
-        if best is None or candidate.miss < best.miss:
+        settled = float(np.max(np.abs(h), initial=0.0)) <= _SETTLED
+        if best is None or candidate.miss < best.miss or (moving and candidate.miss <= FEASIBLE):
             best = candidate
-        if (deepest <= _CLEAR and off <= _EXACT) or off > _ASTRAY:
+        moving = not settled
+        if (settled and deepest <= _CLEAR and off <= _EXACT) or off > _ASTRAY:
             break
-        aim = Aim(aim.X @ relative, aim.xi + slip)
+        aim = Aim(aim.X @ np.linalg.solve(task.target, target) @ relative, aim.xi + slip)
+        task = replace(task, target=target)
         margins = margins + _PUSH * cut
-        start = solution
+        start = at_rest(bench.structure, solution)
     if best is None:
         raise ValueError("no round was made")
     return replace(best, solves=tuple(solves))
@@ -214,4 +234,6 @@ def _parameters(bench: Workbench, margins: Array, aim: Array) -> Array:
     parts.append(np.minimum(np.minimum(-numbers.rates[0], numbers.rates[1]), 1e6))
     if numbers.dynamics is not None:
         parts += [numbers.dynamics.inertia.ravel(), np.linalg.inv(numbers.dynamics.inertia).ravel()]
+    if bench.task.free is not None:
+        parts.append(bench.task.free.ravel())
     return np.concatenate([np.asarray(part, dtype=float) for part in parts])

@@ -1,7 +1,7 @@
 """One interval of the transcription, with derivatives written by hand where they are short on a group.
 
-A stage is w = (S, v, s, r): the state S = (X, and xi to second order), the controls v, the duration s where it is free, and the
-change r of the controls. Over an interval X_next = X exp(Theta(q)), q = w without X, and
+A stage is w = (S, v, s, h, r): the state S = (X, and xi to second order), the controls v, the duration s where it is free, the
+motion h that the goal leaves free, and the change r of the controls. Over an interval X_next = X exp(Theta(q)), q = w without X, and
     dX_next = X_next hat(K dq),   K = J(Theta) dTheta/dq,   J(Theta) = I - ad/2 + ad^2/6 - ...,
     d2X_next = X_next (hat(K dq)^2 + hat(dJ[dTheta] dTheta) + hat(J d2Theta)).
 First derivatives are those of the step to rounding; in the second ones dJ keeps its leading term [d, [Theta, d]] / 6, of
@@ -32,7 +32,7 @@ _SLOPE_DEGREE = 7
 
 
 def interval(structure: Structure) -> Piece:
-    """The next (S, v, s), and the cost of the interval."""
+    """The next (S, v, s, h), and the cost of the interval."""
     at, group, size = symbols(structure), structure.group, structure.size
     S, q = at.parts["X"], at.w[size:]
     duration = at.parts["s"] if structure.free_time else ca.SX(1)
@@ -44,7 +44,7 @@ def interval(structure: Structure) -> Piece:
     d = group.degree
     product = [[sum_products((X[i][k], E[k][j]) for k in range(d)) for j in range(d)] for i in range(d)]
     moved = ca.vertcat(*[ca.SX(entry) for entry in pack(group, product)])
-    rest = [v + r, at.parts["s"]] if structure.free_time else [v + r]
+    rest = [v + r, at.parts["s"], at.parts["h"]]
     others, simple_others = ca.vertcat(*change, *rest), ca.vertcat(*simple_change, *rest)
     energy = ca.dot(at.parts["weights"], v * v + v * (v + r) + (v + r) ** 2) * h / 3
     cost = h + 1e-6 * energy if structure.free_time else energy

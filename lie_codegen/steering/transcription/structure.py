@@ -24,6 +24,7 @@ class Structure:
         free_time: whether the duration is a variable, and the objective.
         second_order: whether the controls are torques, the state (X, xi).
         periodic: whether the controls end as they begin.
+        free: how many directions of the algebra the goal leaves free: X meets target exp(hat(F h)), h a variable.
         guarded: whether the half-space around an element to meet is a condition too: the equations alone also hold half a
             turn away.
     """
@@ -37,6 +38,7 @@ class Structure:
     free_time: bool = False
     second_order: bool = False
     periodic: bool = False
+    free: int = 0
     guarded: bool = False
 
     @cached_property
@@ -51,13 +53,14 @@ class Structure:
 
     @cached_property
     def variable_ranges(self) -> dict[str, tuple[int, int]]:
-        """Where each part of a stage (X, xi, v, s, r) is."""
+        """Where each part of a stage (X, xi, v, s, h, r) is."""
         m = len(self.controls)
         return _ranges(
             ("X", self.size),
             ("xi", self.group.dim if self.second_order else 0),
             ("v", m),
             ("s", 1 if self.free_time else 0),
+            ("h", self.free),
             ("r", m),
         )
 
@@ -74,6 +77,7 @@ class Structure:
             ("via", self.size * len(self.via)),
             ("rates", len(self.controls)),
             ("masses", 2 * n * n if self.second_order else 0),
+            ("free", n * self.free),
         )
 
     @property
@@ -94,13 +98,17 @@ class Structure:
     @property
     def parameters(self) -> int:
         """All parameters."""
-        return self.parameter_ranges["masses"][1]
+        return self.parameter_ranges["free"][1]
 
     def kind(self, node: int) -> str:
         """Which conditions hold at a node."""
         if node in (0, self.intervals):
             return "last" if node else "first"
         return "via" if node in self.via else "inner"
+
+    def watched(self, kind: str) -> bool:
+        """Whether obstacles are kept away from at nodes of that kind: where X is given that was looked at before."""
+        return kind in ("inner", "via") or (kind == "last" and self.free > 0)
 
     def goal(self, node: int) -> int:
         """Where the element to meet at a node is among the parameters."""

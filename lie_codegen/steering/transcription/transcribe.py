@@ -41,6 +41,8 @@ from lie_codegen.steering.transcription.structure import Structure
 _FALLBACK = 4
 #: Full turns added to the end heading of paths between discs.
 _TURNS = (0, 1, -1)
+#: Further elements of a set of goals that are begun from.
+_ELSEWHERE = 2
 #: Clearance (of squared distances, or cosines) above which an obstacle does not hold.
 _IDLE = 1e-5
 
@@ -136,8 +138,10 @@ def _run(
         began = time.perf_counter()
         built = program(shape, name, listening=progress is not None)
         building += time.perf_counter() - began
-        bench = Workbench(task, shape, numbers, built, progress or (lambda line: None))
-        candidates += _candidates(bench, asked)
+        for element in _elements(task):
+            there = replace(task, target=element)
+            bench = Workbench(there, shape, numbers, built, progress or (lambda line: None))
+            candidates += _candidates(bench, asked)
         if any(candidate.admissible for candidate in candidates):
             break
     good = [candidate for candidate in candidates if candidate.admissible]
@@ -162,6 +166,15 @@ def _solvers(task: Task, structure: Structure, asked: Options) -> tuple[str, ...
     if asked.periodic or not task.report.controllable or not endable(structure):
         return ("ipopt",)
     return ("fatrop", "ipopt")
+
+
+def _elements(task: Task) -> tuple[Array, ...]:
+    """Elements of the goal to begin from: the one given, and some along its free directions, as turns that none would come to
+    from the others for obstacles in between."""
+    if not task.freedom:
+        return (task.target,)
+    rng = np.random.default_rng(0)
+    return (task.target, *(task.moved(h) for h in rng.uniform(-np.pi, np.pi, (_ELSEWHERE, task.freedom))))
 
 
 def _candidates(bench: Workbench, asked: Options) -> list[Candidate]:
@@ -231,7 +244,7 @@ def _plan(
         "fine_times": flight.t * task.duration,
         "classes": classes_found(numbers, candidates, task.duration, time=structure.free_time),
     }
-    error, slip = distance(group, task.target, flight.X[-1]), 0.0
+    error, slip = distance(group, best.target, flight.X[-1]), 0.0
     if numbers.dynamics is not None:
         second, xi = numbers.dynamics, flight.xi / task.duration
         slip = float(np.linalg.norm(xi[-1] - second.ends[1] / task.duration))
@@ -251,7 +264,7 @@ def _plan(
     }
     return Plan(
         group=group,
-        target=task.target,
+        target=best.target,
         controls=tuple(group.labels[i] for i in task.controls),
         duration=duration,
         method=method,

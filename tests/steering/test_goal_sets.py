@@ -1,0 +1,103 @@
+"""Sets of goals where there is more to heed than the end: obstacles, inertia, rest; against plans to single elements of the set."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm, logm
+
+import lie_codegen as lc
+
+SO3 = lc.group("so3")
+
+
+def flown(plan: lc.Plan) -> np.ndarray:
+    """(k, d, d) states of the true system, by an integrator of scipy's."""
+    d = plan.group.degree
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        return (x.reshape(d, d) @ plan.group.hat(plan.u(min(t, plan.duration)))).ravel()
+
+    run = solve_ivp(rate, (0, plan.duration), np.eye(d).ravel(), rtol=1e-9, atol=1e-10, max_step=plan.duration / 200)
+    return np.asarray(run.y.T.reshape(-1, d, d))
+
+
+def test_a_boresight_passes_a_cone_and_ends_at_the_best_roll() -> None:
+    axis, direction = np.array([1.0, 0, 0]), np.array([0.2, 0.9, -0.4])
+    direction /= np.linalg.norm(direction)
+    cone = lc.Cone((1, 0, 0), tuple(axis + direction + [0, 0, 0.15]), 0.2)
+    plan = lc.steer(SO3, lc.Pointing(axis, direction), ("w1", "w2"), 1.0, obstacles=[cone])
+    X = flown(plan)
+    np.testing.assert_allclose(X[-1] @ axis, direction, atol=1e-6)
+    assert np.min(cone.clearance(X)) > -1e-6
+    # the roll is free: any other roll costs more, to first order nothing
+    roll = SO3.hat(axis)
+    costs = [
+        lc.steer(SO3, plan.target @ expm(angle * roll), ("w1", "w2"), 1.0, obstacles=[cone]).cost
+        for angle in (-0.02, 0.0, 0.02, 2.0, -2.0)
+    ]
+    assert costs[1] == pytest.approx(plan.cost, rel=1e-5)
+    assert costs[0] - costs[1] == pytest.approx(costs[2] - costs[1], rel=0.1)
+    assert min(costs) >= plan.cost * (1 - 1e-5)
+
+
+def test_a_position_behind_a_ball_is_cheaper_than_the_same_with_any_heading() -> None:
+    ball, point = lc.Ball((1.0, 0.45), 0.35), np.array([2.0, 1.0])
+    plan = lc.steer("se2", lc.Position(point), ("omega", "vx"), 3.0, obstacles=[ball])
+    X = flown(plan)
+    np.testing.assert_allclose(X[-1, :2, 2], point, atol=1e-6)
+    assert np.min(ball.clearance(X)) > -1e-6
+    turn = lc.group("se2").hat([1, 0, 0])
+    for angle in (-0.3, 0.3):
+        other = lc.steer("se2", plan.target @ expm(angle * turn), ("omega", "vx"), 3.0, obstacles=[ball])
+        assert other.cost > plan.cost
+    assert plan.details["goal"] == lc.Position(point)
+
+
+@pytest.mark.slow
+def test_torques_turn_a_boresight_and_the_body_that_starts_elsewhere() -> None:
+    start, direction = expm(SO3.hat([0.3, -0.8, 0.5])), np.array([0, 0.6, 0.8])
+    options = {"dynamics": "second_order", "inertia": [1.0, 2.0, 3.0], "bounds": 2.0}
+    plan = lc.steer(SO3, lc.Pointing((0, 0, 1), direction), ("w1", "w2", "w3"), 3.0, start=start, **options)
+    np.testing.assert_allclose(plan.X_final[:, 2], direction, atol=1e-9)
+    assert plan.status.name == "LOCAL"
+    for angle in (-0.3, 0.3):
+        roll = expm(SO3.hat([0, 0, angle]))
+        assert lc.steer(SO3, plan.target @ roll, ("w1", "w2", "w3"), 3.0, start=start, **options).cost > plan.cost
+
+
+def test_goals_become_cosets() -> None:
+    from lie_codegen.steering.goals import cosets, end_of
+
+    rng = np.random.default_rng(3)
+    se3, su2 = lc.group("se3"), lc.group("su2")
+    element = expm(se3.hat(rng.normal(size=6)))
+    for group, goal, dimensions in (
+        (SO3, lc.Pointing((0, 0, 1), (0, 0, -1)), 1),
+        (SO3, lc.Pointing((1, 2, 3), (3, -1, 1)), 1),
+        (se3, lc.Pointing((1, 0, 0), (0, 1, 1)), 4),
+        (se3, lc.Position((1, 2, 3)), 3),
+        (se3, lc.Coset(element, ("w1", "v2"), side="left"), 2),
+        (su2, lc.Pointing((0, 0, 1), (1, 0, 0)), 1),
+        (su2, lc.UpToPhase(np.eye(2)), 0),
+    ):
+        elements, free = cosets(group, goal, "test")
+        assert free.shape == (dimensions, group.dim)
+        end = end_of(group, goal, "test")
+        for number, T in enumerate(elements):
+            X = T @ expm(group.hat(rng.normal(size=dimensions) @ free)) if dimensions else T
+            if len(end.before):  # X T^-1 is a motion of space along the free directions
+                turn = np.real(logm(X @ np.linalg.inv(T)))
+                coordinates = group.project(turn)
+                fit = np.linalg.lstsq(end.before.T, coordinates, rcond=None)[0]
+                np.testing.assert_allclose(fit @ end.before, coordinates, atol=1e-9)
+            elif not len(end.after):
+                np.testing.assert_allclose(end.left @ X @ end.right, end.values[number], atol=1e-12)
+
+
+def test_no_way_is_proved_for_a_set_too_and_other_methods_name_those_that_take_one() -> None:
+    with pytest.raises(lc.errors.InfeasibleError, match="position"):
+        lc.steer("se2", lc.Position((9, 0)), ("omega", "vx"), 1.0, bounds=1, obstacles=[lc.Ball((4.0, 0.0), 0.5)])
+    with pytest.raises(lc.errors.SteeringInputError, match="transcription"):
+        lc.steer("se2", lc.Position((0, 1)), ("omega", "vx"), 1.0, method="area_rule")
