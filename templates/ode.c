@@ -116,11 +116,15 @@ static double error_of(const Field *field, const Rules *rules, const double *y, 
     return both < HUGE_VAL ? both : HUGE_VAL;
 }
 
-/* How long the first step may be (Hairer, Norsett, Wanner, II.4). */
+/*
+ * How long the first step may be: tau, the time in which y or its slope changes by its own size, times the part of it after
+ * which a term of order 8 is small (Hairer, Norsett, Wanner, II.4, who take the unit of time for tau: a slow motion told in
+ * seconds would start with steps of a second).
+ */
 static double first_step(const Field *field, const Rules *rules, double t, const double *y, const double *k, double span, double *other, double *slope)
 {
     const ptrdiff_t n = field->size;
-    double d0 = 0.0, d1 = 0.0, d2 = 0.0, h, most;
+    double d0 = 0.0, d1 = 0.0, d2 = 0.0, tau = fabs(span), probe, moved;
     ptrdiff_t i;
     for (i = 0; i < n; ++i) {
         const double scale = rules->atol[i] + rules->rtol * fabs(y[i]);
@@ -129,22 +133,31 @@ static double first_step(const Field *field, const Rules *rules, double t, const
     }
     d0 = sqrt(d0 / (double)n);
     d1 = sqrt(d1 / (double)n);
-    h = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
-    h = copysign(fmin(h, fabs(span)), span);
-    for (i = 0; i < n; ++i) {
-        other[i] = y[i] + h * k[i];
+    if (d0 > 1e-5 && d1 > 0.0) {
+        tau = fmin(tau, d0 / d1);
+        probe = 0.01 * tau;
+    } else {
+        probe = 1e-6 * tau;
     }
-    if (evaluate(field, t + h, other, slope)) {
-        return h;
+    probe = copysign(probe, span);
+    for (i = 0; i < n; ++i) {
+        other[i] = y[i] + probe * k[i];
+    }
+    if (!(tau < HUGE_VAL) || evaluate(field, t + probe, other, slope)) {
+        return probe;
     }
     for (i = 0; i < n; ++i) {
         const double scale = rules->atol[i] + rules->rtol * fabs(y[i]);
         d2 += (slope[i] - k[i]) * (slope[i] - k[i]) / (scale * scale);
     }
-    d2 = sqrt(d2 / (double)n) / fabs(h);
-    most = fmax(d1, d2);
-    most = most <= 1e-15 ? fmax(1e-6, fabs(h) * 1e-3) : pow(0.01 / most, 1.0 / 8.0);
-    return most > 0.0 ? copysign(fmin(fmin(100.0 * fabs(h), most), fabs(span)), span) : h;
+    d2 = sqrt(d2 / (double)n) / fabs(probe);
+    if (d1 > 0.0 && d2 > 0.0) {
+        tau = fmin(tau, d1 / d2);
+    }
+    moved = fmax(d1 * tau, d2 * tau * tau);
+    /* At rest there is nothing to measure: a step that still sees what comes. */
+    tau *= moved > 0.0 ? pow(0.01 / moved, 1.0 / 8.0) : 1e-3;
+    return tau > 0.0 ? copysign(fmin(tau, fabs(span)), span) : probe;
 }
 
 static int crossed(double before, double after, ptrdiff_t direction)

@@ -47,9 +47,8 @@ def run(
     directions: Sequence[int], longest: float,
 ) -> tuple[Array, Array, int, int, int]:  # fmt: skip
     """Knots, states, status, event, evaluations; see `integrate`."""
-    times, states, slope, count = [t0], [y0], f(t0, y0), 1
-    size = float(np.sqrt(np.mean((slope / (atol + rtol * np.abs(y0))) ** 2)))
-    h = math.copysign(min(abs(t1 - t0), longest, 1e-2 / size ** (1 / 8) if size > 0 else abs(t1 - t0)), t1 - t0)
+    times, states, slope, count = [t0], [y0], f(t0, y0), 2
+    h = _first_step(f, t0, y0, slope, t1 - t0, atol + rtol * np.abs(y0))
     before = events(t0, y0) if events is not None else np.zeros(0)
     grow = 10.0
     while times[-1] != t1:
@@ -84,6 +83,26 @@ def run(
             return np.array(times), np.array(states), _EVENT, which, count
         slope = f(reached, after)
     return np.array(times), np.array(states), _REACHED, -1, count
+
+
+def _first_step(f: Function, t: float, y: Array, slope: Array, span: float, scale: Array) -> float:
+    """See first_step of templates/ode.c."""
+
+    def size(values: Array) -> float:
+        return float(np.sqrt(np.mean((values / scale) ** 2)))
+
+    d0, d1, tau = size(y), size(slope), abs(span)
+    known = d0 > 1e-5 and d1 > 0
+    tau = min(tau, d0 / d1) if known else tau
+    probe = math.copysign((0.01 if known else 1e-6) * tau, span)
+    if not math.isfinite(tau):
+        return probe
+    d2 = size(f(t + probe, y + probe * slope) - slope) / abs(probe)
+    if d1 > 0 and d2 > 0:
+        tau = min(tau, d1 / d2)
+    moved = max(d1 * tau, d2 * tau * tau)
+    tau *= (0.01 / moved) ** (1 / 8) if moved > 0 else 1e-3
+    return math.copysign(min(tau, abs(span)), span) if tau > 0 else probe
 
 
 def _locate(f: Function, events: Function, which: int, at: tuple[float, Array, float, Array], before: float) -> float:

@@ -89,3 +89,26 @@ def test_many_knots_are_kept():
     motion = integrate(Field(lambda t, y: np.array([y[1], -y[0]]), 2), [0, 1], 0.0, 100.0, longest=0.1)
     assert len(motion.t) > 999
     np.testing.assert_allclose(motion.at(77.7), [np.sin(77.7), np.cos(77.7)], atol=1e-11)
+
+
+@pytest.mark.usefixtures("loops")
+def test_the_steps_do_not_depend_on_the_unit_of_time():
+    """The same motion told in microseconds, seconds and years: as many evaluations, but for rounding."""
+    counts = []
+    for unit in (1e-6, 1.0, 3e7):
+        motion = integrate(
+            Field(lambda t, y, u=unit: np.array([y[1], -y[0]]) / u, 2), [1, 0.5], 0.0, 20 * unit, rtol=1e-9, atol=1e-12
+        )
+        np.testing.assert_allclose(motion.y[-1, 0], np.cos(20) + 0.5 * np.sin(20), atol=1e-7)
+        counts.append(motion.evaluations)
+    assert max(counts) - min(counts) <= 12
+    still = integrate(Field(lambda t, y: np.zeros(2), 2), [0, 0.0], 0.0, 1e8)
+    assert still.status == REACHED
+    assert still.evaluations < 100
+
+
+@pytest.mark.usefixtures("loops")
+def test_from_zero_and_from_rest():
+    """y = 0 has no size, and y' = 0 at the start says nothing of what comes."""
+    motion = integrate(Field(lambda t, y: np.array([np.exp(-t / 1e6), t / 1e6]), 2), [0, 0], 0.0, 5e6)
+    np.testing.assert_allclose(motion.y[-1] / 1e6, [1 - np.exp(-5), 12.5], rtol=1e-11)
