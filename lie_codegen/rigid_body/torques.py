@@ -14,6 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
+from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, parameter_values
 
@@ -135,16 +136,26 @@ class Torque(Saved):
         return cross([ops.constant(m) for m in self.numbers["m"]], b)
 
     def _formula(self, ops: Arithmetic, X: Any, omega: Any, t: Scalar) -> list[Scalar]:
+        kernel = self.numbers.get("kernel")
+        if kernel is not None:
+            known = {"X": [list(row) for row in X], "omega": list(omega), "t": t}
+            inputs = [
+                known[port.name] if port.name in known else _constants(ops, self.numbers["parameters"][port.name])
+                for port in kernel.inputs
+            ]
+            return list(kernel.evaluate(ops, *inputs)[0])
         values = [*(X[i][j] for i in range(3) for j in range(3)), *omega, t]
         symbols = [sp.Symbol(name, real=True) for name in _STATE]
         evaluate = ExpressionEvaluator(ops, dict(zip(symbols, values, strict=True)))
         return [evaluate(each) for each in self.numbers["formulas"]]
 
     @property
-    def key(self) -> str:
-        """A text that determines the kernels."""
+    def key(self) -> tuple[str, Kernel | None]:
+        """What determines the kernels: a text, and the kernel of one's own, which its text would not tell from another."""
         own = None if self.plates is None else [getattr(self.plates, n).tolist() for n in Plates.__dataclass_fields__]
-        return f"{self.kind} {'function' if self.is_function else self.direction} {dict(self.numbers)} {own}"
+        numbers = {name: value for name, value in self.numbers.items() if name != "kernel"}
+        direction = "function" if self.is_function else self.direction
+        return f"{self.kind} {direction} {numbers} {own}", self.numbers.get("kernel")
 
 
 def cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
@@ -212,14 +223,56 @@ class torque:  # noqa: N801
         return Torque("residual_dipole", _direction(field, parameters, "field"), {"m": dipole.tolist()})
 
     @staticmethod
-    def formula(formulas: Sequence[Any], parameters: Mapping[str, Any] | None = None) -> Torque:
-        """N in body axes from three formulas in X11 .. X33 (body to inertial), w1 w2 w3 [rad/s], t [s] and the parameters."""
-        if isinstance(formulas, str) or len(formulas) != 3:
-            raise InputError(f"torque.formula: three formulas are needed, got {formulas!r}")
+    def formula(formulas: Sequence[Any] | Kernel, parameters: Mapping[str, Any] | None = None) -> Torque:
+        """A torque of one's own, N (3,) in body axes.
+
+        Args:
+            formulas: three formulas in X11 .. X33 (body to inertial), w1 w2 w3 [rad/s], t [s] and the parameters; or a kernel
+                of any of the inputs X (3, 3), omega (3,), t, in any order, whose first output is N.
+            parameters: name -> number; of a kernel its other inputs, with their shapes.
+
+        Raises:
+            InputError: not three formulas; a kernel with another shape, with complex ports or with an input that has no value.
+        """
+        if isinstance(formulas, Kernel):
+            return Torque("formula", None, _own_kernel(formulas, parameters or {}))
+        if isinstance(formulas, str) or not hasattr(formulas, "__len__") or len(formulas) != 3:
+            raise InputError(f"torque.formula: three formulas or a kernel are needed, got {formulas!r:.80}")
         values = _parameters(parameters, _STATE, "torque.formula")
         names = {name: sp.Symbol(name, real=True) for name in _STATE}
         read = [formula(each, {**names, **values}, f"torque.formula: N_{i + 1}") for i, each in enumerate(formulas)]
         return Torque("formula", None, {"formulas": read})
+
+
+def _own_kernel(kernel: Kernel, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    shapes = {"X": (3, 3), "omega": (3,), "t": ()}
+    where = f"torque.formula: the kernel {kernel.symbol}"
+    if any(port.is_complex for port in (*kernel.inputs, kernel.outputs[0])):
+        raise InputError(f"{where} has complex ports; a torque is real")
+    if kernel.outputs[0].shape != (3,):
+        raise ShapeError(f"{where} gives {kernel.outputs[0].name} of shape {kernel.outputs[0].shape}; N is (3,)")
+    given, names = {}, [port.name for port in kernel.inputs]
+    unknown = sorted(set(parameters) - set(names) | set(parameters) & set(shapes))
+    if unknown:
+        raise InputError(f"{where}: the parameter {unknown[0]!r} is none of its inputs beside X, omega and t")
+    for port in kernel.inputs:
+        if port.name in shapes:
+            if port.shape != shapes[port.name]:
+                raise ShapeError(f"{where}: {port.name} has shape {port.shape}, not {shapes[port.name]}")
+            continue
+        if port.name not in parameters:
+            raise InputError(f"{where} has the input {port.name!r}: rename it X, omega or t, or give it in parameters=")
+        value = np.asarray(parameters[port.name], dtype=float)
+        if value.shape != port.shape:
+            raise ShapeError(f"{where}: the parameter {port.name} has shape {value.shape}, not {port.shape}")
+        if not np.all(np.isfinite(value)):
+            raise NotFiniteError(f"{where}: the parameter {port.name} holds NaN or infinity")
+        given[port.name] = value.tolist()
+    return {"kernel": kernel, "parameters": given}
+
+
+def _constants(ops: Arithmetic, value: Any) -> Any:
+    return [_constants(ops, each) for each in value] if isinstance(value, list) else ops.constant(value)
 
 
 def _direction(value: Any, parameters: Mapping[str, Any] | None, what: str) -> Any:

@@ -43,7 +43,7 @@ class TorqueModel:
         self.functions = [each for each in self.torques if each.is_function]
         self.has_smooth = any(each.plates is None for each in self.torques)
         self.turns = _TURNS_OF_FORMULAS if any(each.kind == "formula" for each in self.torques) else _TURNS
-        self.key = f"{J.tolist()} {[each.key for each in self.torques]}"
+        self.key = (repr(J.tolist()), *(each.key for each in self.torques))
 
     def environment(self, ops: Arithmetic, t: Scalar, given: Sequence[Scalar]) -> list[Scalar]:
         """(t, directions) at time t; `given` are those that functions gave."""

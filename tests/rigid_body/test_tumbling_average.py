@@ -95,6 +95,51 @@ def test_a_formula_of_the_same_torque():
     np.testing.assert_allclose(mean.H_dot, known.H_dot, atol=1e-13)
 
 
+def dipole_and_drag(ops, omega, t, X, m, c):
+    """A kernel written by hand: m x b(t) less c omega, its inputs in an order of its own."""
+    field = (0.2, -0.5 * ops.cos(ops.constant(0.3) * t), 0.4)
+    b = [sum(X[i][j] * field[i] for i in range(3)) for j in range(3)]
+    pairs = ((1, 2), (2, 0), (0, 1))
+    return ([m[i] * b[j] - m[j] * b[i] - c * w for (i, j), w in zip(pairs, omega, strict=True)],)
+
+
+def own_kernel(body=dipole_and_drag, size=3):
+    ports = (lc.Port("omega", (3,)), lc.Port("t", ()), lc.Port("X", (3, 3)), lc.Port("m", (3,)), lc.Port("c", ()))
+    return lc.Kernel("own", "stranger", ports, (lc.Port("N", (size,)),), body)
+
+
+def test_a_kernel_of_ones_own():
+    """Rates, runs and direct motion of a kernel are those of the same torque as formulas; two kernels are told apart."""
+    b = [f"(X1{i}*0.2 - X2{i}*0.5*cos(0.3*t) + X3{i}*0.4)" for i in (1, 2, 3)]
+    rows = [f"0.2*{b[2]} - 0.3*{b[1]}", f"0.3*{b[0]} - 0.1*{b[2]}", f"0.1*{b[1]} - 0.2*{b[0]}"]
+    text = lc.torque.formula([f"0.01*({row}) - 0.002*w{i + 1}" for i, row in enumerate(rows)])
+    given = {"m": 0.01 * np.array(DIPOLE), "c": 0.002}
+    models = [lc.tumbling_average(BODY, [each]) for each in (lc.torque.formula(own_kernel(), given), text)]
+    rates = [model.rate(START, OMEGA, t=1.7) for model in models]
+    np.testing.assert_allclose(rates[0].H_dot, rates[1].H_dot, rtol=1e-12)
+    assert rates[0].power == pytest.approx(rates[1].power, rel=1e-12)
+    runs = [model.direct(START, OMEGA, [0, 10]) for model in models]
+    np.testing.assert_allclose(runs[0].H, runs[1].H, atol=1e-13)
+    other = lc.torque.formula(own_kernel(lambda ops, omega, t, X, m, c: ([-c * w for w in omega],)), given)
+    damped = lc.tumbling_average(BODY, [other]).rate(START, OMEGA)
+    free = lc.free_rotation(BODY, START, OMEGA)
+    spin = free.omega(free.nutation_period * np.arange(64) / 64)
+    assert damped.power == pytest.approx(-0.002 * np.mean(np.sum(spin**2, axis=1)), rel=1e-11)
+
+
+def test_kernels_that_are_no_torque():
+    for broken, parameters, why in (
+        (own_kernel(), {}, "parameters="),
+        (own_kernel(), {"m": DIPOLE, "c": 1, "d": 2}, "'d'"),
+        (own_kernel(), {"m": (1, 2), "c": 1}, "shape"),
+        (own_kernel(), {"m": (1, 2, np.nan), "c": 1}, "NaN"),
+        (own_kernel(size=4), {"m": DIPOLE, "c": 1}, "shape"),
+        (7, None, "three formulas or a kernel"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            lc.torque.formula(broken, parameters)
+
+
 def test_direct_is_the_true_system():
     """Against SciPy with the plates written out once more."""
     model, plates = orbiting(0.005), debris()
