@@ -27,6 +27,7 @@ enum {
 #define OCP_LOOSE(round) ((real)(round == 0 ? 1e-3 : round == 1 ? 1e-4 : round == 2 ? 1e-5 : 1e-7))
 #define LARGEST_PENALTY ((real)1e7)
 #define CLEAN_PENALTY ((real)1e5)
+#define FIRST_SHIFT ((real)0.1)
 
 typedef struct {
     workspace *w;
@@ -398,7 +399,8 @@ static void find_violation(const task *s)
 #endif
 }
 
-static void update_multipliers(const task *s)
+/* Multipliers go the same share of the way to their next values as the step that was taken went of its own. */
+static void update_multipliers(const task *s, real share)
 {
     workspace *w = s->w;
 #if OCP_NG > 0
@@ -408,7 +410,8 @@ static void update_multipliers(const task *s)
         for (k = 0; k < OCP_N; ++k) {
             model_path(w->x[k], w->u[k], row(s, k), time_of(s, k), g);
             for (i = 0; i < OCP_NG; ++i) {
-                w->lambda[k][i] = is_given(k, i) ? 0 : pressed(w->lambda[k][i], w->rho, g[i]);
+                const real next = is_given(k, i) ? 0 : pressed(w->lambda[k][i], w->rho, g[i]);
+                w->lambda[k][i] += share * (next - w->lambda[k][i]);
             }
         }
     }
@@ -419,12 +422,12 @@ static void update_multipliers(const task *s)
         int i;
         model_end(w->x[OCP_N], row(s, OCP_N), time_of(s, OCP_N), c);
         for (i = 0; i < NEND; ++i) {
-            const real moved = w->lambda_end[i] + w->rho * c[i];
-            w->lambda_end[i] = i < OCP_NG_END ? largest(0, moved) : moved;
+            const real next = w->lambda_end[i] + w->rho * c[i];
+            w->lambda_end[i] += share * ((i < OCP_NG_END ? largest(0, next) : next) - w->lambda_end[i]);
         }
     }
 #endif
-    (void)w;
+    (void)w, (void)share;
 }
 
 /* Lower Cholesky factor of the rows and columns `index` of Q (M x M); 0 where it is not positive definite. */
@@ -903,7 +906,7 @@ int OCP_(solve)(workspace *w, const real *p, ptrdiff_t stride, real t0, real tol
         inner(&s, loose, most);
         find_violation(&s);
         if (conditions) {
-            update_multipliers(&s);
+            update_multipliers(&s, 1);
         }
         if (w->violation <= allowed && loose <= tolerance) {
             break;
@@ -1025,7 +1028,7 @@ static void shift_plan(const task *s)
 int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdiff_t stride, real t0, int iterations, real *u)
 {
     task s;
-    real measured[NS], gain, value, P[NX * NX], v[NX], d[NX], shift = 0;
+    real measured[NS], gain, value, P[NX * NX], v[NX], d[NX], shift, length = 1;
     int i, round, tries, numbers = stride == 0 ? OCP_NP : (OCP_N + 1) * OCP_NP;
     s.w = w;
     s.p = p;
@@ -1050,10 +1053,13 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
         w->status = OCP_INPUT;
         return w->status;
     }
-    if (!w->fresh) {
+    if (w->fresh) {
+        w->shift = 0;
+    } else {
         shift_plan(&s);
     }
     w->fresh = 0;
+    shift = w->shift;
     for (round = 0; round < iterations; ++round) {
         real reference, trial = 0, alpha, first[OCP_M];
         int swept = 0, tried, accepted = 0;
@@ -1081,6 +1087,7 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
         }
         trial = forward(&s, 1);
         accepted = is_finite(trial) && trial <= reference;
+        length = accepted ? 1 : length;
         if (!accepted) {
             const real full = trial;
             reference = forward(&s, 0);
@@ -1089,10 +1096,12 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
                 for (alpha = (real)0.5, tried = 1; tried < 4 && !accepted; ++tried, alpha /= 2) {
                     trial = forward(&s, alpha);
                     accepted = trial <= reference;
+                    length = accepted ? alpha : length;
                 }
             } else if (is_finite(full)) {
                 trial = forward(&s, 1);
                 accepted = 1;
+                length = 1;
             }
             if (!accepted) {
                 const real held = forward(&s, 0);
@@ -1103,13 +1112,16 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
                     copy(w->u[0], first, OCP_M);
                 }
                 w->status = round == 0 ? OCP_HELD : w->status;
+                shift = largest(10 * shift, FIRST_SHIFT); /* the next sample tries a shorter step, not the same one again */
                 break;
             }
         }
         take_new(w);
+        shift = shift * (real)0.3 < (real)1e-5 ? 0 : shift * (real)0.3;
     }
+    w->shift = shift;
     if (w->status == OCP_OK) {
-        update_multipliers(&s);
+        update_multipliers(&s, length);
         find_violation(&s);
     }
     for (i = 0; i < OCP_M; ++i) {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ocp_systems import GRAVITY, QUADROTOR, SATELLITE, SE3, SO3, kernel, quadrotor, rotation, satellite
+from ocp_systems import GRAVITY, QUADROTOR, SATELLITE, SE3, SO3, kernel, planar, quadrotor, rotation, satellite
 from scipy.linalg import expm
 
 import lie_codegen as lc
@@ -71,6 +71,29 @@ def test_an_undisturbed_loop_flies_its_plan() -> None:
 def test_one_iteration_with_multipliers_shifted_follows_the_optimum_within_two_per_cent() -> None:
     """Quadrotor among cylinders in gusts, against the loop that iterates to convergence."""
     compare(range(1), 40)
+
+
+def test_a_trial_that_failed_makes_the_next_step_shorter_and_the_disc_is_kept_out_of() -> None:
+    """A cart in a hurry round a disc, from anywhere. With the same step tried again sample after sample it drove 0.29 m into it."""
+    cart = lc.ocp(
+        "se2", inputs={"u": 2}, states={"s": ()}, velocity=("u2", "s", "0"), rates={"s": "u1"}, duration=2.0, intervals=20,
+        stage_cost=("2*(X13 - 3)", "2*(X23 - 1)", "0.3*s", "0.2*u1", "0.2*u2"),
+        terminal_cost=("5*(X13 - 3)", "5*(X23 - 1)", "2*s"), bounds=2.0, name="cart",
+        constraints=("0.25 - (X13 - 1.5)*(X13 - 1.5) - (X23 - 0.4)*(X23 - 0.4)", "s <= 1.5", "-s <= 0.5"),
+    )  # fmt: skip
+    held, deepest, jumps = 0, 0.0, 0.0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        X0 = planar(rng.uniform(-3, 3), rng.uniform(-1, 0.8), rng.uniform(-1.5, 1.5))
+        controller = lc.mpc(cart)
+        controller.reset(X0=X0, s=0.5)
+        run = controller.simulate(X0, steps=60, values={"s": 0.5})
+        held += sum(status == "held" for status in run.status)
+        deepest = max(deepest, 0.5 - float(np.min(np.hypot(run.X[:, 0, 2] - 1.5, run.X[:, 1, 2] - 0.4))))
+        jumps += float(np.sum(np.abs(np.diff(run.u[:, 0])))) / 12
+    assert deepest < 0.02
+    assert held < 0.12 * 720
+    assert jumps < 12
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from lie_codegen.steering.ocp.model import Model
 from lie_codegen.steering.ocp.problem_data import ProblemData
 
 _LOOSE = (1e-3, 1e-4, 1e-5, 1e-7)
-_LARGEST_PENALTY, _CLEAN_PENALTY = 1e7, 1e5
+_LARGEST_PENALTY, _CLEAN_PENALTY, _FIRST_SHIFT = 1e7, 1e5, 0.1
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -96,17 +96,19 @@ class InterpretedMachine(Machine):
                 worst = (off, self.sizes.path + row, N)
         space["violation"], space["worst"], space["worst_stage"] = worst
 
-    def _multipliers(self, run: Run) -> None:
+    def _multipliers(self, run: Run, share: float) -> None:
         space, N = run.space, self.data.intervals
         rho = float(space["rho"])
         for k in range(N):
             g = self.model.path(space["x"][k], space["u"][k], run.row(k), self._time(run, k))
             moved = np.maximum(0, space["lambda"][k][: len(g)] + rho * g)
-            space["lambda"][k][: len(g)] = np.where(self.model.given(k), 0, moved)
+            lam = space["lambda"][k][: len(g)]
+            lam += share * (np.where(self.model.given(k), 0, moved) - lam)
         c = self.model.end(space["x"][N], run.row(N), self._time(run, N))
         moved = space["lambda_end"][: len(c)] + rho * c
         below = np.arange(len(c)) < self.sizes.end_path
-        space["lambda_end"][: len(c)] = np.where(below, np.maximum(0, moved), moved)
+        lam = space["lambda_end"][: len(c)]
+        lam += share * (np.where(below, np.maximum(0, moved), moved) - lam)
 
     # sweeps
 
@@ -269,7 +271,7 @@ class InterpretedMachine(Machine):
             self._inner(run, loose, most)
             self._violation(run)
             if conditions:
-                self._multipliers(run)
+                self._multipliers(run, 1.0)
             met = w["violation"] <= allowed
             finished = bool(met and loose <= tolerance and w["iterations"] < most)
             if finished or w["iterations"] >= most:
@@ -341,7 +343,7 @@ class InterpretedMachine(Machine):
             w["lambda"][: N - 1] = w["lambda"][1:].copy()
             last = (w["x"][N - 1], w["u"][N - 1], run.row(N - 1), self._time(run, N - 1))
             w["x"][N] = self.model.step(*last, self.h)
-        status, shift = OK, 0.0
+        status, length, shift = OK, 1.0, 0.0 if fresh else float(w["shift"])
         for attempt in range(iterations):
             swept = None
             for _ in range(4):
@@ -355,8 +357,10 @@ class InterpretedMachine(Machine):
                 break
             d = self.model.difference(w["x"][0], measured)
             expected = swept[1] + 256 * _EPSILON * (1 + abs(swept[1])) + float(d @ (swept[3] + swept[2] @ d / 2))
-            if not self._improve(run, expected):
+            taken = self._improve(run, expected)
+            if taken is None:
                 status = HELD if attempt == 0 else status
+                shift = max(10 * shift, _FIRST_SHIFT)
                 held = self._forward(run, 0.0)
                 if np.isfinite(held):
                     self._take_new(run)
@@ -365,18 +369,20 @@ class InterpretedMachine(Machine):
                     w["x"][0] = measured
                 break
             self._take_new(run)
+            length, shift = taken, 0.0 if 0.3 * shift < 1e-5 else 0.3 * shift
+        w["shift"] = shift
         if status == OK:
-            self._multipliers(run)
+            self._multipliers(run, length)
             self._violation(run)
         return status
 
-    def _improve(self, run: Run, reference: float) -> bool:
-        """Whether a roll-out does as well as the plan fed back; it is then in x_new, u_new."""
+    def _improve(self, run: Run, reference: float) -> float | None:
+        """The length of a step whose roll-out, then in x_new and u_new, does as well as the plan fed back; None if none does."""
         full = self._forward(run, 1.0)
         if np.isfinite(full) and full <= reference:
-            return True
+            return 1.0
         held = self._forward(run, 0.0)
         held += 256 * _EPSILON * (1 + abs(held))
         if not np.isfinite(held) or full <= held:
-            return bool(np.isfinite(full)) and bool(np.isfinite(self._forward(run, 1.0)))
-        return any(self._forward(run, 0.5**halvings) <= held for halvings in (1, 2, 3))
+            return 1.0 if np.isfinite(full) and np.isfinite(self._forward(run, 1.0)) else None
+        return next((alpha for alpha in (0.5, 0.25, 0.125) if self._forward(run, alpha) <= held), None)
