@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.exact.numbers import field_elements
+from lie_codegen.on_demand import sympy as sp
 
 
 def ad(algebra: LieAlgebra, i: int) -> sp.Matrix:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.structure import structure
@@ -24,6 +23,7 @@ from lie_codegen.algebra.subspace import annihilated, brackets, contains, span, 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import domain_matrix, is_positive_definite, to_numbers
+from lie_codegen.on_demand import sympy as sp
 
 _STEPS = 40
 #: Relative residual of the checks beyond which a numeric result is refused; generic bases of condition 10^3 end at 1e-9.

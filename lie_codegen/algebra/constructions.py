@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.orthogonal_basis import orthogonal_table
 from lie_codegen.errors import AlgebraError, DependentBasisError, InputError, NotClosedError
 from lie_codegen.exact.numbers import Number, domain_matrix, exact_number, real_coordinates, to_numbers
+from lie_codegen.on_demand import sympy as sp
 
 
 def algebra_from_brackets(

@@ -8,11 +8,11 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.errors import AlgebraError, InputError, JacobiError
 from lie_codegen.exact.numbers import Number
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.on_demand import sympy as sp
 
 #: Sparse vector: basis index -> coefficient, no zeros.
 Sparse = Mapping[int, Number]

@@ -14,10 +14,10 @@ from math import lcm
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.exact.numbers import Number
+from lie_codegen.on_demand import sympy as sp
 
 #: Sums of products of that many bits stay exact in 64.
 _BITS = 62

@@ -10,8 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
-import sympy as sp
-
 from lie_codegen.algebra.adjoint import ad, killing_form
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.subspace import (
@@ -26,6 +24,7 @@ from lie_codegen.algebra.subspace import (
 )
 from lie_codegen.errors import ComputationError
 from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
+from lie_codegen.on_demand import sympy as sp
 
 #: Coordinates of a vector.
 Vector = tuple[Number, ...]

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas
 from lie_codegen.averaging.averaged import average
 from lie_codegen.errors import AssumptionError, InputError, ShapeError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
-from lie_codegen.signals.input_formulas import TIME
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 
@@ -75,7 +75,7 @@ def oscillator_average(group: GroupLike, oscillator: PointMassOscillator, x_dot:
             f"oscillator_average: section 6.2 asks for zero-mean x', and its mean is {list(x_dot.exact_mean)}"
         )
     calculus, signal = x_dot.waveform.calculus({}, 3)
-    x = x_dot.waveform.expressions(calculus, calculus.primitive(signal), 3, TIME) / x_dot.waveform.omega
+    x = x_dot.waveform.expressions(calculus, calculus.primitive(signal), 3, time_symbol()) / x_dot.waveform.omega
     momentum = sp.Matrix(x).cross(sp.Matrix(x_dot.expressions))
     inverse = sp.Matrix(oscillator.inertia).inv()
     mass = oscillator.reduced_mass

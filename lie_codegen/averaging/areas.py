@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from itertools import combinations
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 

@@ -9,19 +9,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas, moments
 from lie_codegen.averaging.nilpotent import nilpotency_step
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import floquet_magnus
-from lie_codegen.signals.input_formulas import TIME
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_series import expressions_of, functions_of
 
@@ -221,7 +221,7 @@ def average(
     calculus, rates, logarithms = _recursion(group, u, order)
     waveform = u.waveform
     exact = tuple(
-        waveform.expressions(calculus, f, group.dim, TIME) * waveform.omega ** (1 - q)
+        waveform.expressions(calculus, f, group.dim, time_symbol()) * waveform.omega ** (1 - q)
         for q, f in enumerate(rates, start=1)
     )
     return Averaged(group, u, order, form, _initial(group, X0), exact, calculus, tuple(logarithms))

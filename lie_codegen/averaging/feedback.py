@@ -14,13 +14,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.order_check import OrderCheck, different_scales, order_report
 from lie_codegen.errors import ComputationError, InputError, ShapeError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.flow.feedback_flow import feedback_flow
@@ -33,7 +32,8 @@ from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.signals.input_formulas import TIME, period_of
+from lie_codegen.on_demand import sympy as sp
+from lie_codegen.signals.input_formulas import period_of
 from lie_codegen.signals.signal_values import expressions_of
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
 from lie_codegen.signals.trig_signal import TrigCalculus
@@ -203,7 +203,7 @@ class FeedbackAverage(Saved):
     def _vanishes_at(self, g: Array, numbers: Mapping[sp.Symbol, sp.Expr]) -> bool:
         at = {**numbers, **dict(zip(self.g, map(sp.Float, g), strict=True))}
         length = float(self.period.subs(numbers))
-        function = sp.lambdify([TIME], list(self.u.subs(at)), "numpy")
+        function = sp.lambdify([time_symbol()], list(self.u.subs(at)), "numpy")
         return all(np.max(np.abs(np.array(function(t), dtype=float))) < 1e-9 for t in np.linspace(0, length, 37))
 
 
@@ -216,7 +216,7 @@ def feedback_kernel(
     formulas = (average.u_average if averaged else average.u).subs(numbers)
     n = average.group.dim
     ports = (Port("t", (), "s"), Port("g", (n,)))
-    body = expression_body([TIME, average.g], [list(formulas)])
+    body = expression_body([time_symbol(), average.g], [list(formulas)])
     return Kernel(name, average.group.name, ports, (Port("u", (n,)),), body, "u(t, g)", "TR 93-59, (17), (18)")
 
 
@@ -237,17 +237,17 @@ def feedback_average(
         raise ShapeError(f"feedback_average: give {group.dim} formulas, one for each of {', '.join(group.labels)}")
     g = sp.symbols(f"g1:{group.dim + 1}", real=True)
     extra = {name: sp.Symbol(name, real=True) for name in parameters}
-    names = {"t": TIME, "pi": sp.pi, **{str(s): s for s in g}, **extra}
+    names = {"t": time_symbol(), "pi": sp.pi, **{str(s): s for s in g}, **extra}
     formulas = [_formula(entry, names) for entry in u]
     length = period_of(period, extra)
     try:
-        form = trig_form(formulas, TIME, length, "feedback_average")
+        form = trig_form(formulas, time_symbol(), length, "feedback_average")
     except NotTrigonometricError as error:
         raise InputError(
             f"feedback_average: {error} is not a sum of sines and cosines in t with coefficients in g"
         ) from None
     calculus = TrigCalculus({}, form.ring)
-    mean = expressions_of(calculus.mean(form.signal), group.dim, form.ring, TIME, form.units)
+    mean = expressions_of(calculus.mean(form.signal), group.dim, form.ring, time_symbol(), form.units)
     return FeedbackAverage(group, tuple(g), sp.ImmutableMatrix(formulas), length, mean, tuple(extra.values()))
 
 

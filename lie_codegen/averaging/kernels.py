@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.averaging.averaged import Averaged
 from lie_codegen.errors import InputError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.matrices import matrix_port
@@ -26,7 +26,7 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
 from lie_codegen.kernel.linear import Vector, bracket, matmul, plus, scaled
-from lie_codegen.signals.input_formulas import TIME
+from lie_codegen.on_demand import sympy as sp
 
 _SOURCE = {
     "floquet": "Floquet-Magnus recursion, left-invariant form",
@@ -77,7 +77,7 @@ def averaged_state(averaged: Averaged, statement: str = "") -> Kernel:
     data = GroupDerivation(group)
 
     def body(ops: Arithmetic, eps: Scalar, t: Scalar, *values: Scalar) -> tuple[Any, ...]:
-        evaluate = ExpressionEvaluator(ops, {TIME: t, **dict(zip(symbols, values, strict=True))})
+        evaluate = ExpressionEvaluator(ops, {time_symbol(): t, **dict(zip(symbols, values, strict=True))})
         if averaged.form == "floquet" or averaged.order == 1:
             mean = exp_matrix(ops, data, scaled(t, _rate(averaged, evaluate, eps)))
             waves = [_vector(evaluate, wave) for wave in averaged.exact_Lambda]
@@ -123,7 +123,7 @@ def periodic_input(averaged: Averaged) -> Kernel:
     entries = averaged.u.expressions
 
     def body(ops: Arithmetic, t: Scalar, *values: Scalar) -> tuple[Any, ...]:
-        evaluate = ExpressionEvaluator(ops, {TIME: t, **dict(zip(symbols, values, strict=True))})
+        evaluate = ExpressionEvaluator(ops, {time_symbol(): t, **dict(zip(symbols, values, strict=True))})
         return (_vector(evaluate, entries),)
 
     inputs = (_T, *_parameters(symbols))

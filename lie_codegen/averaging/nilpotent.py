@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.exact.numbers import Number, domain_matrix
+from lie_codegen.on_demand import sympy as sp
 
 
 def nilpotency_step(algebra: LieAlgebra) -> int | None:

@@ -13,8 +13,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.averaging.shape_connection import ShapeConnection, connection
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.numbers import exact_number
@@ -22,6 +20,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.actuators import positive_inertia
 from lie_codegen.mechanics.body_frame import body_frame
+from lie_codegen.on_demand import sympy as sp
 
 
 def point_mass_connection(group: GroupLike, *, body_mass: Any, masses: Sequence[Any], inertia: Any) -> ShapeConnection:

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.averaging.frame_search import best_frame
@@ -26,6 +25,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.formulas import formula
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True, eq=False, repr=False)

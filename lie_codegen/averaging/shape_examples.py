@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.averaging.shape_connection import ShapeConnection, connection
 from lie_codegen.errors import InputError
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
 from lie_codegen.mechanics.formulas import quantity
+from lie_codegen.on_demand import sympy as sp
 
 _R1, _R2 = sp.symbols("r1 r2", real=True)
 

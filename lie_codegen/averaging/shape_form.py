@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -16,6 +15,7 @@ from lie_codegen.averaging.path_end import end_of
 from lie_codegen.averaging.shape_frame import ShapeFrame
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import Value
 
 #: Step of the complex differences that give exact first derivatives of analytic formulas.

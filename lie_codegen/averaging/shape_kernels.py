@@ -5,8 +5,6 @@ from __future__ import annotations
 import random
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.averaging.shape_form import ShapeForm
 from lie_codegen.errors import InputError
 from lie_codegen.groups.maps.matrices import matrix_port, random_element
@@ -18,6 +16,7 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, bracket, dot, plus, scaled
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
+from lie_codegen.on_demand import sympy as sp
 
 NAMESPACE = "shape"
 SOURCE = "TR 93-59, section 6; Hatton and Choset, IEEE T-RO 29 (2013)"

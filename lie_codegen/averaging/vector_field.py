@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.mechanics.formulas import formula, parameter_values
+from lie_codegen.on_demand import sympy as sp
 
 #: body(ops, variables, others) -> the components.
 FieldBody = Callable[[Arithmetic, Sequence[Scalar], Sequence[Scalar]], list[Scalar]]

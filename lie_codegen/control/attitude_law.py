@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.control.attitude import gyroscopic_factor
 from lie_codegen.errors import InputError, ShapeError
@@ -38,6 +37,7 @@ from lie_codegen.kernel.linear import (
     transpose,
 )
 from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
+from lie_codegen.on_demand import sympy as sp
 
 _KINDS = ("p", "pd", "reduced")
 _ATTITUDE = Port("X", (3, 3), description="attitude error: body to reference, R_d' R")

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import eigh
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.certificate_constants import Metric, hessian_bound, quadratic_bounds
@@ -37,6 +36,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import made_from
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import scipy
 
 _LAW = "lie_codegen.control.tracking_law:tracking_law"
 
@@ -240,7 +240,7 @@ def certificate(
     search = LevelSearch(samples, body, level, 0.0, np.random.default_rng(seed), moving=moving, reach=bound)
     b_1, b_2 = quadratic_bounds(search, metric, stiffness)
     h, t = hessian_bound(search, metric), metric.turning()
-    damping = eigh(K_d, body, eigvals_only=True)
+    damping = scipy.linalg.eigh(K_d, body, eigvals_only=True)
     theorem = TheoremNumbers(b_1, b_2, h, t, float(damping[0]), float(damping[-1]), float(speed))
     if speed:
         search = LevelSearch(

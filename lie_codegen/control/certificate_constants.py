@@ -11,11 +11,11 @@ At the reference the quotient is 0/0 and depends on the direction: phi/|d phi|^2
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eigh
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.level_search import LevelSearch, Places
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import scipy
 
 
 class Metric:
@@ -71,7 +71,7 @@ class Metric:
 
 def quadratic_bounds(search: LevelSearch, metric: Metric, stiffness: Array) -> tuple[float, float]:
     """b_1 and b_2 on the level."""
-    limits = eigh(stiffness, metric.I, eigvals_only=True)
+    limits = scipy.linalg.eigh(stiffness, metric.I, eigvals_only=True)
 
     def ratio(places: Places) -> Array:
         phi, slope = search.samples.first(places.X, places.X_d)

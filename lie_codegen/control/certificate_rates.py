@@ -17,11 +17,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.certificate_constants import Metric
 from lie_codegen.control.level_search import LevelSearch, Places
+from lie_codegen.on_demand import scipy
 
 #: Turns of the exchange at most, and places that it remembers.
 _EXCHANGES, _KEPT = 12, 40
@@ -78,7 +78,9 @@ class TheoremNumbers:
     def best(self, overshoot: float | None = None) -> Rate:
         """The largest rate."""
         high = largest_epsilon(self.b_2, overshoot)
-        found = minimize_scalar(lambda e: -self.rate(e), bounds=(0, high), method="bounded", options={"xatol": 1e-12})
+        found = scipy.optimize.minimize_scalar(
+            lambda e: -self.rate(e), bounds=(0, high), method="bounded", options={"xatol": 1e-12}
+        )
         epsilon = float(found.x)
         return Rate(epsilon, self.rate(epsilon), overshoot_of(epsilon, self.b_2))
 

@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
-from lie_codegen.control.reference_motion import TIME, formula_of_time
+from lie_codegen.control.reference_motion import formula_of_time
 from lie_codegen.errors import InputError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import sympy as sp
 
 #: How far |r| may be from 1 for a reference on a sphere.
 _UNIT = 1e-9
@@ -51,10 +52,10 @@ def curve_reference(formulas: Sequence[Any], sphere: bool = False) -> CurveRefer
 @kernel_factory()
 def curve_kernel(reference: CurveReference, name: str = "reference") -> Kernel:
     """t -> (r, r_dot, r_ddot)."""
-    curves = [[sp.diff(entry, TIME, order) if order else entry for entry in reference.r] for order in range(3)]
+    curves = [[sp.diff(entry, time_symbol(), order) if order else entry for entry in reference.r] for order in range(3)]
 
     def body(ops: Arithmetic, t: Scalar) -> tuple[Any, ...]:
-        evaluate = ExpressionEvaluator(ops, {TIME: t})
+        evaluate = ExpressionEvaluator(ops, {time_symbol(): t})
         return tuple([evaluate(entry) for entry in curve] for curve in curves)
 
     shape = (len(reference.r),)

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector
+from lie_codegen.on_demand import sympy as sp
 
 #: (ops, t, X, xi) -> (n,) body force.
 ForceBody = Callable[[Arithmetic, Scalar, Any, Vector], Vector]
 
-_TIME = sp.Symbol("t", real=True)
 _READS = {"t": "t", "X": "X", "q": "X", "xi": "xi", "omega": "xi", "q_dot": "xi"}
 
 
@@ -62,7 +60,7 @@ def symbols_of(
     if element.is_complex:
         raise InputError("formulas of X are for real groups; give a Kernel for a complex one")
     arrays: dict[str, dict[tuple[int, ...], sp.Expr]] = {}
-    names: dict[str, sp.Expr] = {"t": _TIME, "pi": sp.pi}
+    names: dict[str, sp.Expr] = {"t": time_symbol(), "pi": sp.pi}
     if len(element.shape) == 2:
         places = [(i, j) for i in range(element.shape[0]) for j in range(element.shape[1])]
         arrays["X"] = {(i, j): sp.Symbol(f"X_{i}_{j}", real=True) for i, j in places}
@@ -83,7 +81,7 @@ def values_of_symbols(
     arrays: Mapping[str, Mapping[tuple[int, ...], sp.Expr]], t: Scalar, X: Any, xi: Sequence[Scalar]
 ) -> dict[sp.Symbol, Scalar]:
     """What the symbols of `symbols_of` stand for."""
-    values: dict[Any, Scalar] = {_TIME: t}
+    values: dict[Any, Scalar] = {time_symbol(): t}
     for place, symbol in arrays["X"].items():
         values[symbol] = X[place[0]][place[1]] if len(place) == 2 else X[place[0]]
     values |= {symbol: xi[place[0]] for place, symbol in arrays.get("xi", {}).items()}

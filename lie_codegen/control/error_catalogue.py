@@ -20,8 +20,6 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols, error_function
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
@@ -29,6 +27,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.definition import record_factory
+from lie_codegen.on_demand import sympy as sp
 
 Gains = Mapping[str, Any]
 

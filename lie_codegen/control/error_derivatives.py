@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy as sp
-
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import jacobian
@@ -22,6 +20,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.dual import DualArithmetic, split, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Matrix, Vector, bracket, matmul, matvec, minus, negative
+from lie_codegen.on_demand import sympy as sp
 
 
 class ErrorDerivatives:

@@ -11,8 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
@@ -21,6 +19,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.matrix_formula import MatrixLog, matrix_formula, scalar_formula
+from lie_codegen.on_demand import sympy as sp
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
 NAMED_TRANSPORTS = ("right", "left")

@@ -23,7 +23,6 @@ from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic
-from lie_codegen.kernel.casadi_arithmetic import function_of
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, matmul
@@ -47,8 +46,10 @@ class Samples:
 class _Batch:
     """A CasADi Function over N columns at once, without copies: called a thousand times with a handful of columns by a search."""
 
-    def __init__(self, function: Any) -> None:
-        self.function = function
+    def __init__(self, kernel: Kernel) -> None:
+        from lie_codegen.kernel.casadi_arithmetic import function_of
+
+        self.function: Any = function_of(kernel)  # CasADi declares its buffers otherwise than they are
         self.opened: dict[int, Any] = {}
 
     def __call__(self, *arguments: Array) -> list[Array]:
@@ -84,12 +85,12 @@ class ErrorSamples:
         self._moved: _Batch | None = None
         derivation = GroupDerivation(pair.group)
         if derivation.matrix_pattern is not None:
-            self._moved = _Batch(function_of(_move_kernel(derivation)))
+            self._moved = _Batch(_move_kernel(derivation))
 
     def at(self, X: Array, X_d: Array | None = None) -> Samples:
         """phi and its derivatives at (N, d, d) configurations, for one reference each; the identity if not given."""
         if self._second is None:
-            self._second = _Batch(function_of(self._kernel()))
+            self._second = _Batch(self._kernel())
         n = self.group.dim
         phi, slope, hessian = self._second(*self._flat(X, X_d))
         return Samples(phi[:, 0], slope, hessian.reshape(-1, n, n))
@@ -97,14 +98,14 @@ class ErrorSamples:
     def first(self, X: Array, X_d: Array | None = None) -> tuple[Array, Array]:
         """phi and slope alone, whose formulas are found sooner."""
         if self._first is None:
-            self._first = _Batch(function_of(self._first_kernel()))
+            self._first = _Batch(self._first_kernel())
         phi, slope = self._first(*self._flat(X, X_d))
         return phi[:, 0], slope
 
     def transport(self, X: Array, X_d: Array | None = None) -> tuple[Array, Array]:
         """P, (N, n, n), and its derivatives along the basis at X_d fixed: rates[:, a] = A_a P, (N, n, n, n)."""
         if self._transport is None:
-            self._transport = _Batch(function_of(self._transport_kernel()))
+            self._transport = _Batch(self._transport_kernel())
         n = self.group.dim
         P, rates = self._transport(*self._flat(X, X_d))
         return P.reshape(-1, n, n), rates.reshape(-1, n, n, n)

@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, linprog
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.attitude_law import _rotation
@@ -53,6 +52,7 @@ from lie_codegen.kernel.linear import (
     scaled,
     transpose,
 )
+from lie_codegen.on_demand import scipy
 
 #: Two pair sums that differ by less, relative to the largest, give critical circles, on which the gap is zero.
 _DISTINCT = 1e-9
@@ -270,7 +270,7 @@ def _warped_level(kappa: float, A: float, m: float) -> float:
         return float(x - c * A - (1 - c) * m)
 
     low, high = min(A, m), max(A, m)
-    return float(brentq(off, low - 1e-9, high + 1e-9, xtol=1e-14)) if high > low else A
+    return float(scipy.optimize.brentq(off, low - 1e-9, high + 1e-9, xtol=1e-14)) if high > low else A
 
 
 def _warp(K: Array, kappa: Any, direction: Any) -> tuple[tuple[float, ...], float, float, tuple[float, ...]]:
@@ -315,7 +315,7 @@ def _best_square(A: Array) -> Array:
     rows = np.zeros((3, 4))
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         rows[i, k], rows[i, j], rows[i, 3] = A[j], A[k], 1
-    found = linprog(
+    found = scipy.optimize.linprog(
         [0, 0, 0, -1], A_ub=rows, b_ub=A, A_eq=[[1, 1, 1, 0]], b_eq=[1], bounds=[(0, 1)] * 3 + [(None, None)]
     )
     square = np.maximum(found.x[:3], 0)

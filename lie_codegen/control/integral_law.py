@@ -13,8 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.tracking_law import tracking_law
@@ -27,6 +25,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, matvec, minus, number, plus, scaled
+from lie_codegen.on_demand import sympy as sp
 
 #: Inputs of a tracking law whose numbers are all compiled in.
 _TRACKING = 5

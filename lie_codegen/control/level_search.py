@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.error_samples import ErrorSamples, basis_scales, random_elements
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import scipy
 
 #: Of phi, relative to the level: below it a candidate is the reference, where quotients of phi have no digits.
 _NEAR = 1e-9
@@ -187,7 +187,7 @@ class LevelSearch:
                 {"type": "ineq", "fun": lambda v: 1 - at(v)[3, 0] / reach, "jac": lambda v: -gradient(v, 3) / reach}
             )
         with np.errstate(all="ignore"):
-            found = minimize(
+            found = scipy.optimize.minimize(
                 lambda v: at(v)[0, 0],
                 np.zeros(size),
                 jac=lambda v: gradient(v, 0),

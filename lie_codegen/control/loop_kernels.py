@@ -11,8 +11,6 @@ import random
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.control.loop_model import Loop, Own
 from lie_codegen.control.loop_ports import seen_directions
 from lie_codegen.control.plants import GroupPlant
@@ -23,6 +21,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, plus, scaled
+from lie_codegen.on_demand import sympy as sp
 
 _SOURCE = "Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)"
 

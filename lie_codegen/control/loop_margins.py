@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eig, solve_discrete_lyapunov
-from scipy.special import lambertw
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.compatibility import check_compatibility
@@ -25,6 +23,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix, positive_number, symmetric_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import scipy
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,8 +48,8 @@ class LoopMargins(Saved):
         """
         if isinstance(delay, bool) or not isinstance(delay, int | np.integer) or delay < 0:
             raise InputError(f"sample_period: delay = {delay!r} must be a whole number of samples, 0 or more")
-        slowest = np.sqrt(np.max(np.abs(eig(self.stiffness, self.inertia, right=False))))
-        fastest = np.max(np.abs(eig(self.damping, self.inertia, right=False)))
+        slowest = np.sqrt(np.max(np.abs(scipy.linalg.eig(self.stiffness, self.inertia, right=False))))
+        fastest = np.max(np.abs(scipy.linalg.eig(self.damping, self.inertia, right=False)))
         step = 0.02 / max(slowest, fastest)
         h = step
         # The first period at which it is not stable: there may be stable islands beyond, which no one should fly on.
@@ -100,7 +99,7 @@ class LoopMargins(Saved):
         law = -np.linalg.solve(self.inertia, np.hstack([self.stiffness, self.damping]))
         G = np.vstack([np.eye(n) * step**2 / 2, np.eye(n) * step]) @ law
         noise = np.diag([X**2] * n + [xi**2] * n)
-        return np.asarray(solve_discrete_lyapunov(F, G @ noise @ G.T))
+        return np.asarray(scipy.linalg.solve_discrete_lyapunov(F, G @ noise @ G.T))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,7 +125,7 @@ class FirstOrderMargins(Saved):
 
     def rate(self, delay: float = 0.0) -> float:
         """-Re W_0(-k d)/d, k without delay; negative where the loop grows."""
-        return self.k if delay == 0 else float(-lambertw(-self.k * delay).real / delay)
+        return self.k if delay == 0 else float(-scipy.special.lambertw(-self.k * delay).real / delay)
 
     def deviation(self, step: float, noise: float) -> float:
         """Steady standard deviation of an axis under noise s at each sample: s sqrt(k h/(2 - k h)).

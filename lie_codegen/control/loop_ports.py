@@ -22,7 +22,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import real_number
@@ -31,6 +30,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import Definition, made_from
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec, number
+from lie_codegen.on_demand import sympy as sp
 
 CONFIGURATION, VELOCITY = ("X", "q"), ("xi", "omega", "q_dot")
 REFERENCE = (("X_d", "r"), ("xi_d", "omega_d", "r_dot"), ("xi_d_dot", "omega_d_dot", "r_ddot"))

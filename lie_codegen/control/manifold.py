@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.manifold_plant import ManifoldPlant, manifold_plant
@@ -28,6 +27,7 @@ from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matvec, minus, plus, scaled
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import sympy as sp
 
 #: Places at which a manifold and what lives on it are tried.
 PLACES = 50

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.control.manifold import PLACES, Manifold, read_formula, read_rows, symbols_of
 from lie_codegen.errors import IncompatibleError, InputError
@@ -26,6 +25,7 @@ from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, matvec, minus, negative, plus
+from lie_codegen.on_demand import sympy as sp
 
 _COMPATIBLE = 1e-10
 

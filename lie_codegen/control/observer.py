@@ -18,8 +18,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
-from scipy.linalg import solve_discrete_lyapunov
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
@@ -36,6 +34,8 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matmul, matvec, minus, number, plus, scaled
+from lie_codegen.on_demand import scipy
+from lie_codegen.on_demand import sympy as sp
 
 #: Singular values of {A_a c_i}, relative to the largest, that count as zero.
 _RANK = 1e-9
@@ -114,7 +114,7 @@ class Observer(Kernel):
                 f"observer: with step = {h:g} the error does not die out (spectral radius {radius:.6g}): no steady covariance; a shorter "
                 "step, or more vectors"
             )
-        return np.asarray(solve_discrete_lyapunov(F, G @ vectors @ G.T + rate))
+        return np.asarray(scipy.linalg.solve_discrete_lyapunov(F, G @ vectors @ G.T + rate))
 
 
 @kernel_factory(group=as_group)

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.attitude_law import _rotation
@@ -42,6 +41,7 @@ from lie_codegen.kernel.linear import (
     scaled,
     transpose,
 )
+from lie_codegen.on_demand import scipy
 
 
 class PointingOffset(float):
@@ -110,7 +110,10 @@ class OutputFeedback(Kernel):
 
         rng = np.random.default_rng(0)
         starts = [y, target, *rng.normal(size=(40, 3))]
-        found = [minimize(amended, x / np.linalg.norm(x), method="BFGS", options={"gtol": 1e-12}) for x in starts]
+        found = [
+            scipy.optimize.minimize(amended, x / np.linalg.norm(x), method="BFGS", options={"gtol": 1e-12})
+            for x in starts
+        ]
         best = min(found, key=lambda each: float(each.fun)).x
         e = best / np.linalg.norm(best)
         angle = float(np.arctan2(np.linalg.norm(np.cross(e, target)), e @ target))

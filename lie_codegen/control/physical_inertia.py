@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import eigenvalues
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, cross, dot, matvec, minus, number, scaled
+from lie_codegen.on_demand import sympy as sp
 
 #: The least eigenvalue that is kept, relative to that of the first guess.
-_MARGIN = sp.Rational(1, 100)
+_MARGIN = 0.01
 
 
 def kept_physical(
@@ -48,7 +48,7 @@ def kept_physical(
     slope = [dot(v, matvec(constant_matrix(ops, C), v)) for C in covariances]
     turned = matvec(constant_matrix(ops, Gamma), slope)
     outward = dot(slope, drift)
-    bound = float(least) * float(_MARGIN)
+    bound = float(least) * _MARGIN
     # From twice the bound on a growing part is taken off, all of it at the bound: a' stays continuous.
     part = (ops.constant(2 * bound) - value) / ops.constant(bound)
     part = ops.where(ops.less(part, 0), 0, ops.where(ops.less(1, part), 1, part))

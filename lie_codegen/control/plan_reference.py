@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.reference_motion import PlanReference
@@ -19,6 +18,7 @@ from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
+from lie_codegen.on_demand import scipy
 
 #: Degree of the polynomials that stand for the controls, and their last coefficients, relative to the largest, where they do.
 _DEGREE, _RESOLVED = 16, 1e-9
@@ -196,7 +196,7 @@ def _refined(
                 )
             row = rows[key]
             if row is not None:
-                made = X[i] @ expm(np.array([group.hat(s ** np.arange(6) @ row) for s in inside]))
+                made = X[i] @ scipy.linalg.expm(np.array([group.hat(s ** np.arange(6) @ row) for s in inside]))
                 error[i] = float(np.max(np.abs(made - between[i])))
         smoothed = np.array([knots[float(each)].smoothed for each in t[:-1]])
         lost = np.flatnonzero(smoothed & ~np.isfinite(error))

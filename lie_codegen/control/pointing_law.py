@@ -14,8 +14,6 @@ import random
 from collections.abc import Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.control.attitude import gyroscopic_factor
 from lie_codegen.control.attitude_law import _rotation
 from lie_codegen.errors import InputError, ShapeError
@@ -26,6 +24,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, cross, dot, matvec, minus, negative, number, plus, scaled
+from lie_codegen.on_demand import sympy as sp
 
 _SPINS = ("damped", "free")
 

@@ -12,7 +12,6 @@ from lie_codegen.control.curve_reference import CurveReference, curve_reference
 from lie_codegen.control.manifold import Manifold
 from lie_codegen.control.plan_reference import Planned, plan_reference
 from lie_codegen.control.reference_motion import (
-    TIME,
     FormulaReference,
     PlanReference,
     Reference,
@@ -22,6 +21,7 @@ from lie_codegen.control.reference_motion import (
 from lie_codegen.control.retimed_plan import retimed
 from lie_codegen.control.waypoints import sampled_reference, waypoint_reference
 from lie_codegen.errors import InputError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
@@ -77,7 +77,7 @@ class ReferenceBody:
         return self._waypoints(ops, t, self.reference)
 
     def _formulas(self, ops: Arithmetic, t: Scalar, reference: FormulaReference) -> tuple[Any, Vector, Vector]:
-        evaluate = ExpressionEvaluator(ops, {TIME: t})
+        evaluate = ExpressionEvaluator(ops, {time_symbol(): t})
         g, rate, turn = ([evaluate(e) for e in row] for row in (reference.g, reference.rates, reference.accelerations))
         dual = DualArithmetic(ops)
         moving = [_variable(dual, a, b) for a, b in zip(g, rate, strict=True)]
@@ -264,7 +264,7 @@ def _on_manifold(space: Manifold, formulas: Any) -> CurveReference:
     made = curve_reference(formulas)
     c, _ = space.numeric
     for t in np.linspace(0, 10, 61):
-        point = np.array([float(entry.subs(TIME, float(t))) for entry in made.r])
+        point = np.array([float(entry.subs(time_symbol(), float(t))) for entry in made.r])
         off = np.max(np.abs(np.array(c(point), dtype=float)), initial=0.0)
         if not off <= 1e-9 * max(1.0, float(np.max(np.abs(point)))):
             raise InputError(f"the reference leaves the manifold {space.name}: c(r) = {off:.3g} at t = {t:.6g}, not 0")

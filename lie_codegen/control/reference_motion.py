@@ -14,17 +14,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.errors import InputError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.kernel.saved import Saved
-
-TIME = sp.Symbol("t", real=True)
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,7 +31,7 @@ class FormulaReference(Saved):
 
     Attributes:
         group: the group.
-        g: (n) expressions of `TIME`.
+        g: (n) expressions of t, `time_symbol()`.
         start: (d, d) X_0 as doubles; the identity if None.
     """
 
@@ -44,12 +42,12 @@ class FormulaReference(Saved):
     @cached_property
     def rates(self) -> tuple[sp.Expr, ...]:
         """(n) g'."""
-        return tuple(sp.diff(entry, TIME) for entry in self.g)
+        return tuple(sp.diff(entry, time_symbol()) for entry in self.g)
 
     @cached_property
     def accelerations(self) -> tuple[sp.Expr, ...]:
         """(n) g''."""
-        return tuple(sp.diff(entry, TIME) for entry in self.rates)
+        return tuple(sp.diff(entry, time_symbol()) for entry in self.rates)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,7 +92,7 @@ def formula_reference(group: MatrixGroup, coordinates: Sequence[Any], *, start: 
 
     Args:
         group: the group.
-        coordinates: (n,) texts such as "0.3*sin(2*t)", or SymPy expressions of `TIME`.
+        coordinates: (n,) texts such as "0.3*sin(2*t)", or SymPy expressions of t.
         start: (d, d) element on the left, the identity if not given.
 
     Raises:
@@ -115,16 +113,16 @@ def formula_of_time(entry: Any) -> sp.Expr:
         InputError: a symbol other than t, or abs. ExpressionError: a text outside the grammar.
     """
     if isinstance(entry, str):
-        formula = parse_expression(entry, {"t": TIME, "pi": sp.pi}, FORMULA_FUNCTIONS)
+        formula = parse_expression(entry, {"t": time_symbol(), "pi": sp.pi}, FORMULA_FUNCTIONS)
         if formula.has(sp.Abs):
             raise InputError(f"{entry!r} has a kink, where its velocity jumps; a smooth stand-in is sqrt(x^2 + 0.01)")
         return formula
     if isinstance(entry, float):
         return sp.Rational(repr(entry))
     value = entry if isinstance(entry, sp.Expr) else exact_number(entry)
-    value = value.subs({symbol: TIME for symbol in value.free_symbols if symbol.name == "t"})
-    if value.free_symbols - {TIME}:
+    value = value.subs({symbol: time_symbol() for symbol in value.free_symbols if symbol.name == "t"})
+    if value.free_symbols - {time_symbol()}:
         raise InputError(
-            f"{entry} holds {', '.join(map(str, value.free_symbols - {TIME}))}; a reference is a formula of t"
+            f"{entry} holds {', '.join(map(str, value.free_symbols - {time_symbol()}))}; a reference is a formula of t"
         )
     return value

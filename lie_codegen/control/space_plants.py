@@ -16,7 +16,6 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -35,6 +34,7 @@ from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
 from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
 from lie_codegen.mechanics.vibrational_law import feedback_kernels
+from lie_codegen.on_demand import sympy as sp
 
 #: (ops, t, q, v, command) -> the rate of v.
 Acceleration = Callable[[Arithmetic, Scalar, Vector, Vector, Vector], Vector]

@@ -19,8 +19,6 @@ import random
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.control.claims import check_claims
 from lie_codegen.control.compatibility import check_compatibility
 from lie_codegen.control.error_catalogue import as_error, error_names, gain
@@ -51,6 +49,7 @@ from lie_codegen.kernel.linear import (
     scaled,
 )
 from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
+from lie_codegen.on_demand import sympy as sp
 
 #: The feedforwards by name.
 FEEDFORWARDS = ("basic", "right", "left", "levi_civita")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy as sp
-from sympy.utilities.iterables import strongly_connected_components
+from lie_codegen.on_demand import sympy as sp
 
 
 def diagonal_blocks(matrices: Sequence[sp.MatrixBase]) -> tuple[tuple[int, ...], ...]:
     """Index sets of the irreducible diagonal blocks common to all matrices."""
     size = int(matrices[0].rows)
     edges = {(i, j) for m in matrices for i in range(size) for j in range(size) if i != j and m[i, j] != 0}
-    parts = strongly_connected_components((list(range(size)), sorted(edges)))
+    parts = sp.utilities.iterables.strongly_connected_components((list(range(size)), sorted(edges)))
     return tuple(sorted(tuple(sorted(part)) for part in parts))
 
 

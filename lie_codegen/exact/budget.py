@@ -7,9 +7,8 @@ from contextvars import ContextVar, Token
 from dataclasses import dataclass, fields
 from types import TracebackType
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

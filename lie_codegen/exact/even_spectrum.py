@@ -11,9 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.exact.modular import modular_images, random_point
+from lie_codegen.on_demand import sympy as sp
 
 _POINTS = 2
 

@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.exact.newton_form import NewtonForm, newton_form
 from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
+from lie_codegen.on_demand import sympy as sp
 
 _TAYLOR_TERMS = 24
 

@@ -12,27 +12,49 @@ allows, nothing else: a text is data and is never evaluated as Python nor given 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
-import sympy as sp
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from typing import Any, TypeAlias
 
 from lie_codegen.errors import ExpressionError
 from lie_codegen.exact.budget import current_budget, digits, over
 from lie_codegen.exact.token_stream import Token, TokenStream
+from lie_codegen.on_demand import sympy as sp
 
 _MAX_EXPONENT = 64
 
-Function = Callable[..., sp.Expr]
+Function: TypeAlias = "Callable[..., sp.Expr]"
+
+
+class _OfSympy(Mapping[str, Any]):
+    """Name in the grammar -> what SymPy has by another name, or by the same; looked up when asked for."""
+
+    def __init__(self, *same: str, **others: str) -> None:
+        self._names = {**dict(zip(same, same, strict=True)), **others}
+
+    def __getitem__(self, name: str) -> Any:
+        return getattr(sp, self._names[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
 
 #: What an entry of a matrix or a structure constant may hold beside numbers.
-NUMBER_NAMES: Mapping[str, sp.Expr] = {"pi": sp.pi, "I": sp.I, "i": sp.I}
-NUMBER_FUNCTIONS: Mapping[str, Function] = {"sqrt": sp.sqrt}
+NUMBER_NAMES: Mapping[str, sp.Expr] = _OfSympy("pi", "I", i="I")
+NUMBER_FUNCTIONS: Mapping[str, Function] = _OfSympy("sqrt")
 #: What a formula of an input, a Lagrangian or a perturbation may call.
-FORMULA_FUNCTIONS: Mapping[str, Function] = {
-    "sqrt": sp.sqrt, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "exp": sp.exp, "log": sp.log, "asin": sp.asin,
-    "acos": sp.acos, "atan": sp.atan, "atan2": sp.atan2, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
-    "abs": sp.Abs,
-}  # fmt: skip
+FORMULA_FUNCTIONS: Mapping[str, Function] = _OfSympy(
+    "sqrt", "sin", "cos", "tan", "exp", "log", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", abs="Abs"
+)
+
+
+@cache
+def time_symbol() -> sp.Symbol:
+    """t, the time in formulas; real."""
+    return sp.Symbol("t", real=True)
 
 
 def parse_number(text: str) -> sp.Expr:

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy as sp
-
 from lie_codegen.exact.numbers import Number
+from lie_codegen.on_demand import sympy as sp
 
 #: (a, j) -> ((k, l), factor): M_aj = factor M_kl for even functions, - factor M_kl for odd ones.
 Relation = dict[tuple[int, int], tuple[tuple[int, int], Number]]

@@ -10,11 +10,8 @@ import random
 from collections.abc import Sequence
 from typing import Any
 
-from sympy import nextprime
-from sympy.polys.domains import ZZ
-from sympy.polys.galoistools import gf_factor, gf_from_int_poly
-
 from lie_codegen.exact.numbers import Number, field_elements
+from lie_codegen.on_demand import sympy as sp
 
 #: The first prime tried, a Mersenne prime.
 _PRIME = 2**61 - 1
@@ -42,11 +39,13 @@ def _algebraic(domain: Any, elements: Sequence[Any]) -> tuple[int, list[int]] | 
     integers = [int(c * denominator) for c in modulus]
     prime = _PRIME
     for _ in range(_MOST_PRIMES):
-        factors = gf_factor(gf_from_int_poly(integers, prime), prime, ZZ)[1]
+        factors = sp.polys.galoistools.gf_factor(
+            sp.polys.galoistools.gf_from_int_poly(integers, prime), prime, sp.polys.domains.ZZ
+        )[1]
         root = next((-int(f[1]) % prime for f, _ in factors if len(f) == 2), None)
         if root is not None:
             return prime, [_evaluated(prime, root, domain, element) for element in elements]
-        prime = int(nextprime(prime))
+        prime = int(sp.nextprime(prime))
     return None
 
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import sympy as sp
-
 from lie_codegen.exact.numbers import Number
+from lie_codegen.on_demand import sympy as sp
 
 #: Gaps below this share of the largest eigenvalue or gap are close: Lagrange's form loses their ratio, once a factor.
 _CLOSE = 0.2

@@ -8,16 +8,14 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 import numpy as np
-import sympy as sp
-from sympy.polys.constructor import construct_domain
-from sympy.polys.matrices import DomainMatrix
 
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.exact.budget import current_budget, field_degree, integer_digits, over, require_within
 from lie_codegen.exact.expression import parse_number
+from lie_codegen.on_demand import sympy as sp
 
 #: An exact number: what `exact_number` returns.
-Number: TypeAlias = sp.Expr
+Number: TypeAlias = "sp.Expr"
 
 
 def exact_number(value: Any) -> Number:
@@ -73,14 +71,16 @@ def _exact_float(value: float) -> Number:
     return sp.Rational(numerator, denominator)
 
 
-def domain_matrix(rows: Sequence[Sequence[Number]], shape: tuple[int, int] | None = None) -> DomainMatrix:
+def domain_matrix(
+    rows: Sequence[Sequence[Number]], shape: tuple[int, int] | None = None
+) -> sp.polys.matrices.DomainMatrix:
     """A DomainMatrix over the smallest field that holds all entries."""
     flat = [entry for row in rows for entry in row]
     height = len(rows)
     width = len(rows[0]) if rows else 0
     domain, elements = field_elements(flat)
     table = [elements[r * width : (r + 1) * width] for r in range(height)]
-    return DomainMatrix(table, shape or (height, width), domain)
+    return sp.polys.matrices.DomainMatrix(table, shape or (height, width), domain)
 
 
 def field_elements(values: Sequence[Number]) -> tuple[Any, list[Any]]:
@@ -91,11 +91,11 @@ def field_elements(values: Sequence[Number]) -> tuple[Any, list[Any]]:
         return QQ, [QQ.from_sympy(value) for value in values]
     if field_degree(list(values)) > current_budget().degree:
         raise InputError(over("degree", "the roots in the entries together span a field of too high a degree"))
-    domain, elements = construct_domain(list(values), field=True, extension=True)
+    domain, elements = sp.polys.constructor.construct_domain(list(values), field=True, extension=True)
     return domain, list(elements)
 
 
-def is_positive_definite(form: DomainMatrix) -> bool:
+def is_positive_definite(form: sp.polys.matrices.DomainMatrix) -> bool:
     """Whether every pivot of the elimination without exchanges is positive (Sylvester), for a symmetric matrix."""
     domain = form.domain
     rows = [list(row) for row in form.to_dense().rep.to_ddm()]
@@ -108,7 +108,7 @@ def is_positive_definite(form: DomainMatrix) -> bool:
     return True
 
 
-def to_numbers(matrix: DomainMatrix) -> list[list[Number]]:
+def to_numbers(matrix: sp.polys.matrices.DomainMatrix) -> list[list[Number]]:
     """The entries as SymPy numbers."""
     domain = matrix.domain
     return [[domain.to_sympy(entry) for entry in row] for row in matrix.to_dense().rep.to_ddm()]

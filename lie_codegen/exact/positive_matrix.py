@@ -6,10 +6,10 @@ import warnings
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.errors import InertiaWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.on_demand import sympy as sp
 
 #: Smallest eigenvalue, relative to the largest, that counts as positive.
 _RELATIVE = 1e-12

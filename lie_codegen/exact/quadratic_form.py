@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import sympy as sp
-
 from lie_codegen.exact.numbers import Number
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

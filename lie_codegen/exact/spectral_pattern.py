@@ -17,11 +17,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 
-import sympy as sp
-
 from lie_codegen.exact.modular import modular_images, random_point
 from lie_codegen.exact.numbers import Number
 from lie_codegen.exact.quadratic_form import QuadraticForm
+from lie_codegen.on_demand import sympy as sp
 
 _POINTS = 2
 _MOST_ZEROS = 4

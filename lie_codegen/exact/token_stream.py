@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-import sympy as sp
-
 from lie_codegen.errors import ExpressionError
 from lie_codegen.exact.budget import complaint, current_budget, over
+from lie_codegen.on_demand import sympy as sp
 
 _MAX_LENGTH = 4000
 _WORDS = r"\s*(?:(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<op>\*\*|[-+*/^()%s]))"

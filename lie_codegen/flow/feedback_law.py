@@ -8,21 +8,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.linear import Vector
+from lie_codegen.on_demand import sympy as sp
 
 #: (ops, t, X, g) -> u; X or g is None where the feedback does not read it.
 LawBody = Callable[[Arithmetic, Scalar, Any, Any], Vector]
 
 _NAMES = re.compile(r"\b(X\d\d|X\s*\[|g\d+|g\s*\[)")
-_TIME = sp.Symbol("t", real=True)
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def feedback_body(group: MatrixGroup, u: Kernel | Sequence[str], reads: str) -> 
         raise ShapeError(f"{group.name}: {len(u)} formulas given, one for each of {', '.join(group.labels)} is needed")
     if reads == "X" and group.is_complex:
         raise InputError(f"simulate({group.name}): formulas of X are for real groups; give a Kernel, or read g")
-    names: dict[str, sp.Expr] = {"t": _TIME, "pi": sp.pi}
+    names: dict[str, sp.Expr] = {"t": time_symbol(), "pi": sp.pi}
     entries: dict[tuple[int, ...], sp.Expr] = {}
     if reads == "g":
         entries = {(i,): sp.Symbol(f"g_{i}", real=True) for i in range(group.dim)}
@@ -118,7 +116,7 @@ def feedback_body(group: MatrixGroup, u: Kernel | Sequence[str], reads: str) -> 
     formulas = [parse_expression(str(each), names, FORMULA_FUNCTIONS, {reads: entries}) for each in u]
 
     def of_texts(ops: Arithmetic, t: Scalar, X: Any, g: Any) -> Vector:
-        values: dict[Any, Scalar] = {_TIME: t}
+        values: dict[Any, Scalar] = {time_symbol(): t}
         for place, symbol in entries.items():
             values[symbol] = g[place[0]] if reads == "g" else X[place[0]][place[1]]
         evaluate = ExpressionEvaluator(ops, values)

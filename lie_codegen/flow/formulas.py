@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.errors import InputError, ShapeError
@@ -14,6 +13,7 @@ from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.formula_tables import fourier_table
 from lie_codegen.signals.periodic_input import PeriodicInput
 

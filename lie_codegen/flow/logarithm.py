@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import scipy
 
 #: Nearer to the identity than this the series of the logarithm to third order is exact to rounding.
 _NEAR = 1e-5

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.algebra.cartan import Involution, cartan_involution_of
@@ -18,6 +17,7 @@ from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import domain_matrix, to_numbers
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import Value
 
 

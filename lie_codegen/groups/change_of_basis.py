@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.definition import from_matrices
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 
 def change_of_basis(

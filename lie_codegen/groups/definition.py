@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.constructions import algebra_from_brackets, algebra_from_matrices
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.budget import current_budget, over
@@ -16,6 +14,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier, shown
 from lie_codegen.kernel.definition import makes_records
+from lie_codegen.on_demand import sympy as sp
 
 
 def from_matrices(

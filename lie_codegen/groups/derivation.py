@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import sympy as sp
-
 from lie_codegen.algebra.adjoint import ad, killing_form
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.exact.even_spectrum import EvenSpectrum, even_spectrum
@@ -16,6 +14,7 @@ from lie_codegen.groups.maps.log_structure import LogStructure, log_structure
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import sympy as sp
-
 from lie_codegen.algebra.cartan import cartan_involution_of
 from lie_codegen.algebra.ideal_chain import adapted_basis
 from lie_codegen.algebra.lie_algebra import LieAlgebra
@@ -20,6 +18,7 @@ from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.groups.cartan import restricted_to
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

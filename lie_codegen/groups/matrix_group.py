@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.algebra.constructions import permutation, reorder_algebra
@@ -19,6 +18,7 @@ from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, Sh
 from lie_codegen.kernel.casadi_functions import CasadiFunctions
 from lie_codegen.kernel.definition import Definition, definition_of
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.on_demand import sympy as sp
 
 #: Where the kernels of a group are made, above this file: named here and loaded when `group.casadi` is asked.
 KERNELS, STEP = "lie_codegen.groups.kernels", "lie_codegen.groups.maps.rkmk"

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import sympy as sp
-from sympy.utilities.iterables import strongly_connected_components
-
 from lie_codegen.algebra.constructions import _coordinate_map
 from lie_codegen.exact.numbers import Number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class RealMatrices:
     def blocks(self) -> tuple[tuple[tuple[int, ...], bool], ...]:
         """Diagonal blocks in the order in which X Y = B is solved, and whether each is orthogonal."""
         edges = [(i, j) for (i, j) in self.varying if i != j]
-        parts = strongly_connected_components((list(range(self.size)), edges))
+        parts = sp.utilities.iterables.strongly_connected_components((list(range(self.size)), edges))
         return tuple((tuple(sorted(part)), self._orthogonal(sorted(part))) for part in parts)
 
     @cached_property

@@ -7,13 +7,13 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError
 from lie_codegen.exact.numbers import Number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 #: Entries (column, factor) of the rows of each matrix: every row of a string has one.
 _ROWS: dict[str, tuple[tuple[int, complex], tuple[int, complex]]] = {

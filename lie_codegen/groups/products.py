@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import AlgebraError, InputError, ShapeError
 from lie_codegen.exact.numbers import Number
@@ -16,6 +14,7 @@ from lie_codegen.groups.definition import exact_matrix
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.on_demand import sympy as sp
 
 
 def product(a: GroupLike, b: GroupLike, *, name: str | None = None) -> MatrixGroup:

@@ -12,12 +12,11 @@ Heisenberg, Engel and oscillator algebras among them (a constructive case of Ado
 
 from __future__ import annotations
 
-import sympy as sp
-
 from lie_codegen.algebra.adjoint import ad
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
+from lie_codegen.on_demand import sympy as sp
 
 
 def faithful_representation(algebra: LieAlgebra) -> tuple[sp.ImmutableMatrix, ...]:

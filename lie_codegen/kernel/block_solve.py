@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from sympy.utilities.iterables import strongly_connected_components
-
 from lie_codegen.kernel.arithmetic import Scalar
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
+from lie_codegen.on_demand import sympy as sp
 
 #: (row, column) -> entry; what is not there is zero.
 SparseMatrix = Mapping[tuple[int, int], Scalar]
@@ -24,7 +23,7 @@ _LARGEST_ADJUGATE = 4
 def blocks_of(matrix: SparseMatrix, size: int) -> list[list[int]]:
     """Diagonal blocks in the order in which A x = b is solved: each needs only those before it."""
     edges = [(i, j) for (i, j) in matrix if i != j]
-    components = strongly_connected_components((list(range(size)), edges))
+    components = sp.utilities.iterables.strongly_connected_components((list(range(size)), edges))
     return [sorted(component) for component in components]
 
 

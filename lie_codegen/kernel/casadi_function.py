@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi as ca
-
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic, flatten
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.on_demand import casadi as ca
 
 
 def casadi_function(kernel: Kernel) -> ca.Function:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.on_demand import sympy as sp
 
 
 class ExactArithmetic:

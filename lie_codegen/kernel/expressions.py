@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from functools import reduce
+from functools import cache, reduce
 from typing import Any
-
-import sympy as sp
 
 from lie_codegen.errors import ExpressionError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.on_demand import sympy as sp
 
-_UNARY = {
-    sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.exp: "exp", sp.log: "log", sp.sinh: "sinh", sp.cosh: "cosh",
-    sp.tanh: "tanh", sp.acos: "acos", sp.asin: "asin", sp.atan: "atan", sp.Abs: "fabs",
-}  # fmt: skip
+
+@cache
+def _unary() -> Mapping[Any, str]:
+    """SymPy's functions -> the arithmetic's."""
+    same = ("sin", "cos", "tan", "exp", "log", "sinh", "cosh", "tanh", "acos", "asin", "atan")
+    return {**{getattr(sp, name): name for name in same}, sp.Abs: "fabs"}
 
 
 class ExpressionEvaluator:
@@ -50,7 +51,7 @@ class ExpressionEvaluator:
             return self._power(*expression.args)
         if isinstance(expression, sp.atan2):
             return self.ops.atan2(*map(self, expression.args))
-        name = _UNARY.get(expression.func)
+        name = _unary().get(expression.func)
         if name is None:
             raise ExpressionError(f"{expression.func.__name__} in {expression} has no meaning in generated code")
         return getattr(self.ops, name)(self(expression.args[0]))

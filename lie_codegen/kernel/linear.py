@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.structural_zeros import add, product
+from lie_codegen.on_demand import sympy as sp
 
 Vector = list[Scalar]
 Matrix = list[list[Scalar]]

@@ -18,11 +18,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import sympy as sp
-
 from lie_codegen.errors import ExpressionError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS
 from lie_codegen.exact.token_stream import Token, TokenStream
+from lie_codegen.on_demand import sympy as sp
 
 _MAX_EXPONENT = 16
 

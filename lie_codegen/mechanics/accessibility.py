@@ -17,9 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
-
-import sympy as sp
+from typing import Any, TypeAlias
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError, ShapeError
@@ -28,10 +26,11 @@ from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
 from lie_codegen.mechanics.connection import metric_of, symmetric_product
 from lie_codegen.mechanics.euler_poincare import bracket, euler_poincare, velocity_symbols
+from lie_codegen.on_demand import sympy as sp
 
 _DEGREE = 4
 
-Vector = list[sp.Expr]
+Vector: TypeAlias = "list[sp.Expr]"
 
 
 @dataclass(frozen=True)

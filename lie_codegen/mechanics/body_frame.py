@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 
 def body_frame(group: MatrixGroup, where: str) -> sp.ImmutableMatrix:

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import floquet_magnus
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_polynomial import TimePolynomial, constant, fourier_terms

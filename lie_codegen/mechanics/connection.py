@@ -14,14 +14,13 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
 from lie_codegen.mechanics.euler_poincare import ad_star, bracket
+from lie_codegen.on_demand import sympy as sp
 
 
 def connection(algebra: LieAlgebra, inertia: sp.MatrixBase) -> tuple[sp.ImmutableMatrix, ...]:

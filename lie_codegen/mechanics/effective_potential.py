@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
-import sympy as sp
-
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_polynomial import fourier_terms
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.on_demand import sympy as sp
 
 
 def ad_star(algebra: LieAlgebra, x: Sequence[sp.Expr], a: Sequence[sp.Expr]) -> list[sp.Expr]:

@@ -8,11 +8,11 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.errors import ExpressionError, InputError, NotFiniteError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.on_demand import sympy as sp
 
 _NAME = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(?!\s*\(|\w)", re.ASCII)
 

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import Meter, expanded_terms
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.mechanics.vector_fields import Field, tidy
+from lie_codegen.on_demand import sympy as sp
 
 _CONSTANTS = {"pi"}
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
@@ -17,8 +15,9 @@ from lie_codegen.kernel.linear import Vector, plus, scaled
 from lie_codegen.mechanics.bracket_series import BracketSeries, bracket_series, check_series
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.lagrangian_fields import Dynamics, Fields
-from lie_codegen.mechanics.vibrational_fields import FAST, VibrationalFields, vibrational_fields
+from lie_codegen.mechanics.vibrational_fields import VibrationalFields, fast_time, vibrational_fields
 from lie_codegen.mechanics.vibrational_kernels import SOURCE
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_polynomial import fourier_terms
 
@@ -123,28 +122,32 @@ def series_kernels(fields: LagrangianSeries, namespace: str) -> tuple[Kernel, ..
         return total
 
     def actual(ops: Arithmetic, given: Any, state: Vector, fast: Scalar, small: Scalar) -> Vector:
-        evaluate, point = ExpressionEvaluator(ops, {**given, FAST: fast}), at(ops, given, state)
+        evaluate, point = ExpressionEvaluator(ops, {**given, fast_time(): fast}), at(ops, given, state)
         total = point.word(0)
         for a, u in enumerate(series.inputs):
-            total = plus(total, scaled(evaluate(u.expression(FAST)) / small, point.word(("Y", a))))
+            total = plus(total, scaled(evaluate(u.expression(fast_time())) / small, point.word(("Y", a))))
         return total
 
     def shifted(ops: Arithmetic, given: Any, state: Vector, fast: Scalar, sign: int) -> Vector:
-        evaluate, point, total = ExpressionEvaluator(ops, {**given, FAST: fast}), at(ops, given, state), list(state)
+        evaluate, point, total = (
+            ExpressionEvaluator(ops, {**given, fast_time(): fast}),
+            at(ops, given, state),
+            list(state),
+        )
         for a, U in enumerate(series.primitives):
-            total = plus(total, scaled(sign * evaluate(U.expression(FAST)), point.word(("Y", a))))
+            total = plus(total, scaled(sign * evaluate(U.expression(fast_time())), point.word(("Y", a))))
         return total
 
     def flown(ops: Arithmetic, given: Any, state: Vector, fast: Scalar, small: Scalar, sign: int) -> Vector:
         """The unit-time flow of sign sum eps^q Lambda_q(tau), frozen: one step of fourth order, of a motion of size eps."""
         if not series.logarithms:
             return list(state)
-        evaluate = ExpressionEvaluator(ops, {**given, FAST: fast})
+        evaluate = ExpressionEvaluator(ops, {**given, fast_time(): fast})
         table: dict[Any, Scalar] = {}
         power: Scalar = sign * small
         for terms in series.logarithms:
             for word, wave in terms.items():
-                value = power * evaluate(wave.expression(FAST))
+                value = power * evaluate(wave.expression(fast_time()))
                 table[word] = table[word] + value if word in table else value
             power = power * small
 

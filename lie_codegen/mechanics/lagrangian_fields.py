@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
@@ -19,6 +17,7 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Vector, minus, negative, plus, scaled
 from lie_codegen.mechanics.bracket_series import Word, pairs
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
+from lie_codegen.on_demand import sympy as sp
 
 
 class Dynamics:

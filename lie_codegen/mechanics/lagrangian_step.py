@@ -13,8 +13,6 @@ from __future__ import annotations
 import random
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
@@ -24,6 +22,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
+from lie_codegen.on_demand import sympy as sp
 
 _NEWTON = 4
 

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -30,6 +29,7 @@ from lie_codegen.mechanics.mechanical_run import GroupRun, run, states_of
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
 from lie_codegen.mechanics.polynomial_fields import Field
 from lie_codegen.mechanics.polynomial_kernels import evaluate
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.values import Value

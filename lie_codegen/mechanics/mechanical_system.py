@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ExpressionError, InputError, ShapeError
@@ -19,6 +18,7 @@ from lie_codegen.kernel.exact_arithmetic import ExactArithmetic
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.advected import Advected, advected_vectors
 from lie_codegen.mechanics.formulas import formula, quantity
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import Value
 
 #: A term of a polynomial: exponents of (xi, Gamma), coefficient.

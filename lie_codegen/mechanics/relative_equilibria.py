@@ -13,13 +13,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.routh import RouthReduction
+from lie_codegen.on_demand import sympy as sp
 
 #: A singular value below this, relative to the largest, counts as zero.
 RANK_TOLERANCE = 1e-9

@@ -14,13 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.mechanics.formulas import formula, names_in
 from lie_codegen.mechanics.lagrangian import LagrangianSystem, system_from
 from lie_codegen.mechanics.vector_fields import tidy
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

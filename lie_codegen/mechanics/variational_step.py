@@ -15,8 +15,6 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -44,6 +42,7 @@ from lie_codegen.kernel.linear import (
 from lie_codegen.kernel.small_inverse import inverse
 from lie_codegen.kernel.structural_zeros import is_zero, product
 from lie_codegen.mechanics.kernels import coadjoint
+from lie_codegen.on_demand import sympy as sp
 
 _NEWTON = 3
 

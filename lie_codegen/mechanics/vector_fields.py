@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeAlias
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
+from lie_codegen.on_demand import sympy as sp
 
 #: Components along (q, v), a column.
-Field: TypeAlias = sp.ImmutableMatrix
+Field: TypeAlias = "sp.ImmutableMatrix"
 
 
 def lie_bracket(first: Field, second: Field, state: Sequence[sp.Symbol]) -> Field:

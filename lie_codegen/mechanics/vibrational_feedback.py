@@ -16,14 +16,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.mechanics.lagrangian_average import LagrangianSeries
 from lie_codegen.mechanics.relative_equilibria import newton, parameter_numbers
-from lie_codegen.mechanics.vibrational_fields import FAST, VibrationalFields
+from lie_codegen.mechanics.vibrational_fields import VibrationalFields, fast_time
+from lie_codegen.on_demand import sympy as sp
 
 _AUTHORITY = 1e-8
 
@@ -135,8 +135,8 @@ def switch_phase(fields: VibrationalFields, values: Mapping[sp.Symbol, sp.Expr])
     if fields.gauge == "pull_back":
         return 0.0
     period = float(fields.period)
-    waves = [u.expression(FAST).xreplace(dict(values)) for u in fields.primitives]
-    functions = [sp.lambdify(FAST, wave, "numpy") for wave in waves]
+    waves = [u.expression(fast_time()).xreplace(dict(values)) for u in fields.primitives]
+    functions = [sp.lambdify(fast_time(), wave, "numpy") for wave in waves]
     grid = np.linspace(0, period, 4001)
     size = max(float(np.abs(np.asarray(f(grid)) * np.ones_like(grid)).max()) for f in functions)
     first = np.asarray(functions[0](grid)) * np.ones_like(grid)

@@ -23,10 +23,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations_with_replacement, product
-
-import sympy as sp
 
 from lie_codegen.errors import InputError
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
@@ -39,12 +37,17 @@ from lie_codegen.mechanics.vector_fields import (
     symmetric_product,
     tidy,
 )
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_polynomial import TimePolynomial, fourier_terms
 
-#: The fast time t / eps.
-FAST = sp.Symbol("tau", real=True)
 GAUGES = ("zero_mean", "pull_back")
+
+
+@cache
+def fast_time() -> sp.Symbol:
+    """tau = t / eps."""
+    return sp.Symbol("tau", real=True)
 
 
 @dataclass(frozen=True)
@@ -120,9 +123,9 @@ class VibrationalFields:
         single, double = self.corrections
         total = sp.zeros(len(self.state), 1)
         for a, bracket in enumerate(self.brackets):
-            total += single[a].expression(FAST) * bracket
+            total += single[a].expression(fast_time()) * bracket
         for (a, b), value in double.items():
-            total -= value.expression(FAST) / 2 * self.product(a, b)
+            total -= value.expression(fast_time()) / 2 * self.product(a, b)
         return sp.ImmutableMatrix(total)
 
     @cached_property
@@ -130,7 +133,7 @@ class VibrationalFields:
         """U^a(tau) Y_a(q): y = w + shift."""
         total = sp.zeros(len(self.state), 1)
         for primitive, lift in zip(self.primitives, self.lifts, strict=True):
-            total += primitive.expression(FAST) * lift
+            total += primitive.expression(fast_time()) * lift
         return sp.ImmutableMatrix(total)
 
     @cached_property
@@ -138,7 +141,7 @@ class VibrationalFields:
         """(X, Y_a u^a(tau)): y' = X + (1/eps) Y_a u^a."""
         total = sp.zeros(len(self.state), 1)
         for u, lift in zip(self.inputs, self.lifts, strict=True):
-            total += u.expression(FAST) * lift
+            total += u.expression(fast_time()) * lift
         return self.drift, sp.ImmutableMatrix(total)
 
     def _first(self) -> Field:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
-from lie_codegen.mechanics.vibrational_fields import FAST, VibrationalFields
+from lie_codegen.mechanics.vibrational_fields import VibrationalFields, fast_time
+from lie_codegen.on_demand import sympy as sp
 
 SOURCE = "Sanyal, Bloch and McClamroch, Control of mechanical systems with cyclic coordinates"
 _EPS = Port("eps", (), "1", description="ratio of the fast to the slow time scale")
@@ -40,7 +39,7 @@ def vibrational_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kern
         return Kernel(name, namespace, (*inputs, *parameters), (Port(output, (n,)),), body, text, SOURCE)
 
     def at(ops: Arithmetic, values: dict[sp.Symbol, Scalar], state: Any, tau: Scalar = 0) -> ExpressionEvaluator:
-        return ExpressionEvaluator(ops, {**values, **dict(zip(fields.state, state, strict=True)), FAST: tau})
+        return ExpressionEvaluator(ops, {**values, **dict(zip(fields.state, state, strict=True)), fast_time(): tau})
 
     def moved(evaluate: ExpressionEvaluator, state: Any, field: Any, factor: Scalar) -> list[Scalar]:
         return [x + factor * evaluate(f) if f != 0 else x for x, f in zip(state, field, strict=True)]

@@ -10,7 +10,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
-from lie_codegen.mechanics.vibrational_fields import FAST
+from lie_codegen.mechanics.vibrational_fields import fast_time
 from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
 
 SOURCE = "Sanyal, Bloch and McClamroch, Theorem 2 corrected: averaged equilibrium, amplitude held over a period"
@@ -49,9 +49,9 @@ def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int 
         return ([_saturated(ops, a, design.limit) for a in alpha],)
 
     def force(ops: Arithmetic, tau: Scalar, alpha: Any) -> tuple[Any, ...]:
-        values = {**dict(zip(fields.parameters, parameters(ops, alpha), strict=True)), FAST: tau}
+        values = {**dict(zip(fields.parameters, parameters(ops, alpha), strict=True)), fast_time(): tau}
         evaluate = ExpressionEvaluator(ops, values)
-        return ([evaluate(u.expression(FAST)) / design.eps for u in fields.inputs],)
+        return ([evaluate(u.expression(fast_time())) / design.eps for u in fields.inputs],)
 
     def loop(ops: Arithmetic, state: Any) -> tuple[Any, ...]:
         y, held, j = list(state[:n]), list(state[n : n + na]), state[n + na]

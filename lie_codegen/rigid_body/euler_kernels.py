@@ -6,14 +6,13 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.averaging.phase_routine import Nodes
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.elliptic import Jacobi, Ladder, jacobi, ladder, phase
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import call_routine
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.rigid_body.euler_second_order import phase_loop
 from lie_codegen.rigid_body.euler_variational import (
     CN,

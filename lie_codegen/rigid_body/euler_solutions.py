@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -15,6 +14,7 @@ from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
 from lie_codegen.runtime.ode import REACHED, Field, integrate

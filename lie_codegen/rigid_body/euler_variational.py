@@ -15,10 +15,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
 
 OMEGA, K_MODULUS, K_INTEGRAL, S_MEAN = sp.symbols("Omega k K S", positive=True)

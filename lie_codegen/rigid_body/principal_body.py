@@ -15,19 +15,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
-
-import sympy as sp
+from typing import Any, TypeAlias
 
 from lie_codegen.errors import InputError
 from lie_codegen.mechanics.formulas import formula, quantity
+from lie_codegen.on_demand import sympy as sp
 
 #: The slow time eps t, on which moments of inertia and perturbations may depend.
 TAU = sp.Symbol("tau", real=True)
 #: Two moments of inertia closer than this, relative to the middle one, make a symmetric body.
 SYMMETRY_MARGIN = 1e-3
 
-Triple = tuple[sp.Expr, sp.Expr, sp.Expr]
+Triple: TypeAlias = "tuple[sp.Expr, sp.Expr, sp.Expr]"
 
 
 @dataclass(frozen=True)

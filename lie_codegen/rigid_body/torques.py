@@ -7,18 +7,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, parameter_values
+from lie_codegen.on_demand import sympy as sp
 
-TIME = sp.Symbol("t", real=True)
 _STATE = (*(f"X{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)), "w1", "w2", "w3", "t")
 #: A direction as a function of time that is no formula.
 Function = Callable[[float], ArrayLike]
@@ -105,7 +105,7 @@ class Torque(Saved):
 
     def direction_at(self, ops: Arithmetic, t: Scalar) -> list[Scalar]:
         """The three components at time t, of unit length where only the direction counts."""
-        evaluate = ExpressionEvaluator(ops, {TIME: t})
+        evaluate = ExpressionEvaluator(ops, {time_symbol(): t})
         return self.scaled(ops, [evaluate(each) for each in self.direction])
 
     def scaled(self, ops: Arithmetic, d: Sequence[Scalar]) -> list[Scalar]:
@@ -282,7 +282,7 @@ def _direction(value: Any, parameters: Mapping[str, Any] | None, what: str) -> A
     if isinstance(entries, str) or not hasattr(entries, "__len__") or len(entries) != 3:
         raise InputError(f"{what}: three numbers, three formulas in t, or a function of t, got {value!r}")
     values = _parameters(parameters, ("t",), what)
-    read = tuple(formula(each, {"t": TIME, **values}, f"{what} {i + 1}") for i, each in enumerate(entries))
+    read = tuple(formula(each, {"t": time_symbol(), **values}, f"{what} {i + 1}") for i, each in enumerate(entries))
     if all(each == 0 for each in read):
         raise InputError(f"{what}: the direction is zero")
     return read

@@ -14,13 +14,10 @@ from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
 
-import sympy as sp
-from sympy.polys.domains import QQ, ZZ
-from sympy.polys.rings import PolyRing
-
 from lie_codegen.errors import InputError
+from lie_codegen.on_demand import sympy as sp
 
-#: An int, or a PolyElement over ZZ.
+#: An int, or a PolyElement over the integers.
 Coefficient = Any
 
 
@@ -58,9 +55,9 @@ class CoefficientRing:
         return tuple((k, place[1 / g]) for g, k in place.items() if 1 / g in place and k < place[1 / g])
 
     @cached_property
-    def polynomials(self) -> PolyRing:
+    def polynomials(self) -> sp.polys.rings.PolyRing:
         """The polynomial ring over Z; its generators are named x0, x1, ..."""
-        return PolyRing([f"x{k}" for k in range(len(self.generators))], ZZ)
+        return sp.polys.rings.PolyRing([f"x{k}" for k in range(len(self.generators))], sp.polys.domains.ZZ)
 
     @cached_property
     def multiply(self) -> Callable[[Coefficient, Coefficient], Coefficient]:
@@ -123,7 +120,7 @@ class CoefficientRing:
 
     def divide(self, value: Coefficient, divisor: int) -> Coefficient:
         """Exact division by an integer that divides the content."""
-        return value // divisor if isinstance(value, int) else value.quo_ground(ZZ(divisor))
+        return value // divisor if isinstance(value, int) else value.quo_ground(sp.polys.domains.ZZ(divisor))
 
     def _reduced(self, value: Any) -> Any:
         """Even powers of square roots replaced by integers, g and 1/g cancelled."""
@@ -136,8 +133,8 @@ class CoefficientRing:
         return value
 
     @cached_property
-    def _rationals(self) -> PolyRing:
-        return PolyRing([f"x{k}" for k in range(len(self.generators))], QQ)
+    def _rationals(self) -> sp.polys.rings.PolyRing:
+        return sp.polys.rings.PolyRing([f"x{k}" for k in range(len(self.generators))], sp.polys.domains.QQ)
 
     @cached_property
     def _images(self) -> dict[sp.Expr, Any]:
@@ -209,14 +206,14 @@ def _walk(value: sp.Expr, note: Callable[[sp.Expr], Any]) -> None:
         note(value)
 
 
-def _convert(value: sp.Expr, ring: PolyRing, images: Mapping[sp.Expr, Any]) -> Any:
+def _convert(value: sp.Expr, ring: sp.polys.rings.PolyRing, images: Mapping[sp.Expr, Any]) -> Any:
     if value.is_Rational:
-        return ring.ground_new(QQ(int(value.p), int(value.q)))
+        return ring.ground_new(sp.polys.domains.QQ(int(value.p), int(value.q)))
     if _is_root(value):
         outside, roots = _root_factors(value.base)
         power = (int(value.exp.p) - 1) // 2
         outside *= value.base**power
-        start = ring.ground_new(QQ(int(outside.p), int(outside.q)))
+        start = ring.ground_new(sp.polys.domains.QQ(int(outside.p), int(outside.q)))
         return reduce(lambda a, root: a * _image(root, images), roots, start)
     if isinstance(value, sp.Add):
         return reduce(lambda a, b: a + b, (_convert(argument, ring, images) for argument in value.args))

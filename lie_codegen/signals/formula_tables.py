@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import FormulaInput, fourier_input, lines_input
 from lie_codegen.signals.piecewise_waveform import PiecewiseWaveform
 from lie_codegen.signals.signal_values import SignalTable, table_of

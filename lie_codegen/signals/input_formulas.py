@@ -6,18 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.sampled_signal import resolve
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
 from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform
 
 #: The time in every formula.
-TIME = sp.Symbol("t", real=True)
 _PERIODIC_TO = 1e-9
 
 
@@ -37,7 +36,7 @@ def formula_waveform(
     if period is not None and not period.free_symbols and not float(period) > 0:
         raise PeriodError(f"PeriodicInput: the period {given_period} is not positive")
     try:
-        form = trig_form(formulas, TIME, period, "PeriodicInput")
+        form = trig_form(formulas, time_symbol(), period, "PeriodicInput")
         return TrigWaveform(form, tuple(symbols.values()))
     except NotTrigonometricError as error:
         return _sampled(components, formulas, period, breakpoints, str(error))
@@ -50,7 +49,7 @@ def _sampled(
     breakpoints: Sequence[float],
     culprit: str,
 ) -> Waveform:
-    free = set().union(*(formula.free_symbols for formula in formulas)) - {TIME}
+    free = set().union(*(formula.free_symbols for formula in formulas)) - {time_symbol()}
     if free:
         raise InputError(
             f"PeriodicInput: {culprit} is not a sum of sines and cosines, so the input is taken by its values, and the "
@@ -75,7 +74,7 @@ def _sampled(
 
 def compiled(formulas: Sequence[sp.Expr]) -> Callable[[Array], Array]:
     """(k,) -> (k, n) from formulas of t alone."""
-    functions = [sp.lambdify(TIME, formula, "numpy", cse=True) for formula in formulas]
+    functions = [sp.lambdify(time_symbol(), formula, "numpy", cse=True) for formula in formulas]
 
     def evaluate(t: Array) -> Array:
         times = np.asarray(t, dtype=float)
@@ -103,9 +102,9 @@ def formula_of(entry: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
         InputError: an undeclared symbol.
     """
     if isinstance(entry, str):
-        return parse_expression(entry, {"t": TIME, "pi": sp.pi, **symbols}, FORMULA_FUNCTIONS)
+        return parse_expression(entry, {"t": time_symbol(), "pi": sp.pi, **symbols}, FORMULA_FUNCTIONS)
     if isinstance(entry, sp.Expr):
-        known = {"t": TIME, **symbols}
+        known = {"t": time_symbol(), **symbols}
         for symbol in entry.free_symbols:
             if str(symbol) not in known:
                 raise InputError(f"PeriodicInput: {symbol} in {entry} is not declared; name it in `parameters`")
@@ -130,7 +129,7 @@ def number_of(value: Any, what: str, symbols: Mapping[str, sp.Symbol]) -> sp.Exp
         InputError: if it is not understood or depends on t; names `what`.
     """
     result = formula_of(value, symbols)
-    if result.has(TIME):
+    if result.has(time_symbol()):
         raise InputError(f"PeriodicInput: {what} {value!r} depends on t")
     return result
 

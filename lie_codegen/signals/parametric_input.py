@@ -10,15 +10,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.kernel.saved import Saved
-
-_TIME = sp.Symbol("t", real=True)
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)
@@ -137,17 +135,17 @@ class ParametricInput(Saved):
 
     @cached_property
     def _formulas(self) -> tuple[sp.Expr, ...]:
-        names = {"t": _TIME, "pi": sp.pi, **dict(zip(self.parameters, self._symbols, strict=True))}
+        names = {"t": time_symbol(), "pi": sp.pi, **dict(zip(self.parameters, self._symbols, strict=True))}
         return tuple(parse_expression(text, names, FORMULA_FUNCTIONS) for text in self.components)
 
     @cached_property
     def _function(self) -> Callable[..., Any]:
-        return _compiled((_TIME, *self._symbols), self._formulas)
+        return _compiled((time_symbol(), *self._symbols), self._formulas)
 
     @cached_property
     def _gradient(self) -> Callable[..., Any]:
         entries = [sp.diff(formula, symbol) for symbol in self._symbols for formula in self._formulas]
-        return _compiled((_TIME, *self._symbols), entries)
+        return _compiled((time_symbol(), *self._symbols), entries)
 
     @cached_property
     def _period(self) -> Callable[..., Any]:
@@ -211,15 +209,15 @@ def _wave_terms(formula: sp.Expr) -> list[tuple[sp.Expr, sp.Expr, sp.Expr]] | No
     for term in sp.Add.make_args(sp.expand(TR8(sp.expand(formula)))):
         if term == 0:
             continue
-        factor, wave = term.as_independent(_TIME, as_Add=False)
+        factor, wave = term.as_independent(time_symbol(), as_Add=False)
         if wave == 1:
             terms.append((sp.S.Zero, factor, sp.S.Zero))
             continue
         if not isinstance(wave, sp.sin | sp.cos):
             return None
         angle = sp.expand(wave.args[0])
-        rate, phase = angle.coeff(_TIME, 1), angle.coeff(_TIME, 0)
-        if sp.expand(angle - rate * _TIME - phase) != 0 or rate.has(_TIME) or phase.has(_TIME):
+        rate, phase = angle.coeff(time_symbol(), 1), angle.coeff(time_symbol(), 0)
+        if sp.expand(angle - rate * time_symbol() - phase) != 0 or rate.has(time_symbol()) or phase.has(time_symbol()):
             return None
         if rate.could_extract_minus_sign():  # cos(-x) = cos x, sin(-x) = -sin x
             rate, phase, factor = -rate, -phase, -factor if isinstance(wave, sp.sin) else factor

@@ -8,16 +8,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
+from lie_codegen.exact.expression import time_symbol
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.formula_tables import PieceTable, lines_between, piece_table, series_formula
 from lie_codegen.signals.input_formulas import (
-    TIME,
     coefficients_of,
     exact_value,
     formula_of,
@@ -33,7 +33,7 @@ from lie_codegen.signals.sampled_signal import Interpolated, Panels, resolve
 from lie_codegen.signals.trig_formula import NotTrigonometricError
 from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
 
-__all__ = ["TIME", "PeriodicInput"]
+__all__ = ["PeriodicInput"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,7 +84,7 @@ class PeriodicInput(Saved):
         if self.pieces:
             symbols = tuple(symbol_of(name) for name in names)
             return piecewise_waveform(
-                [end for end, _ in self.pieces], [list(row) for _, row in self.pieces], TIME, symbols
+                [end for end, _ in self.pieces], [list(row) for _, row in self.pieces], time_symbol(), symbols
             )
         if self.table:
             panels, values = Panels(self.table[0]), self.table[1]
@@ -135,8 +135,8 @@ class PeriodicInput(Saved):
         omega = 2 * sp.pi / period_of(period, {})
         zero = [sp.S.Zero] * n
         terms = [list(m[0]) if m else zero]
-        terms += [[a * sp.cos((k + 1) * omega * TIME) for a in row] for k, row in enumerate(c)]
-        terms += [[b * sp.sin((k + 1) * omega * TIME) for b in row] for k, row in enumerate(s)]
+        terms += [[a * sp.cos((k + 1) * omega * time_symbol()) for a in row] for k, row in enumerate(c)]
+        terms += [[b * sp.sin((k + 1) * omega * time_symbol()) for b in row] for k, row in enumerate(s)]
         return PeriodicInput(tuple(sp.Add(*(row[i] for row in terms)) for i in range(n)), period)
 
     @staticmethod
@@ -202,11 +202,11 @@ class PeriodicInput(Saved):
         inside = tuple(moments[:-1])
         names = ("in pieces",) * len(formulas[0])
         try:
-            waveform = piecewise_waveform(ends, formulas, TIME, tuple(symbols.values()))
+            waveform = piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
             given = tuple((end, tuple(row)) for end, row in zip(ends, formulas, strict=True))
             return PeriodicInput(names, ends[-1], tuple(symbols), inside, waveform, given)
         except (NotTrigonometricError, PeriodError):
-            free = set().union(*(f.free_symbols for row in formulas for f in row)) - {TIME}
+            free = set().union(*(f.free_symbols for row in formulas for f in row)) - {time_symbol()}
             if free:
                 raise InputError(
                     f"PeriodicInput.from_pieces: the parameters {', '.join(sorted(map(str, free)))} need pieces that are "
@@ -242,7 +242,7 @@ class PeriodicInput(Saved):
     def exact_mean(self) -> sp.ImmutableMatrix:
         """(n, 1) u_av = (1/T) int_0^T u."""
         calculus, u = self.waveform.calculus({}, self.dim)
-        return self.waveform.expressions(calculus, calculus.mean(u), self.dim, TIME)
+        return self.waveform.expressions(calculus, calculus.mean(u), self.dim, time_symbol())
 
     @property
     def mean(self) -> Array:
@@ -271,7 +271,7 @@ class PeriodicInput(Saved):
             InputError: for a sampled input.
         """
         calculus, u = self.waveform.calculus({}, self.dim)
-        return self.waveform.expressions(calculus, u, self.dim, TIME)
+        return self.waveform.expressions(calculus, u, self.dim, time_symbol())
 
     def __call__(self, t: ArrayLike) -> Array:
         """u(t): scalar t -> (n,), (...,) -> (..., n)."""

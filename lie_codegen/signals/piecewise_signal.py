@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-import sympy as sp
-
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import Coefficient, CoefficientRing
 from lie_codegen.signals.trig_signal import Brackets, TrigCalculus, TrigSignal

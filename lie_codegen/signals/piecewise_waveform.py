@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.piecewise_signal import Pieces, PiecewiseCalculus, ring_values
 from lie_codegen.signals.signal_values import expressions_of, table_of
 from lie_codegen.signals.trig_formula import Census, NotTrigonometricError, Reader, base_rate
 from lie_codegen.signals.trig_signal import Brackets, TrigCalculus, TrigSignal
 from lie_codegen.signals.waveform import moved
-
-#: Time within a piece.
-_LOCAL = sp.Symbol("s", real=True)
 
 
 @dataclass(frozen=True)
@@ -129,10 +126,10 @@ def piecewise_waveform(
     """
     starts = [sp.S.Zero, *ends[:-1]]
     split = [
-        [_by_powers(formula.subs(time, start + _LOCAL)) for formula in row]
+        [_by_powers(formula.subs(time, start + _local())) for formula in row]
         for start, row in zip(starts, formulas, strict=True)
     ]
-    census = Census(_LOCAL)
+    census = Census(_local())
     for row in split:
         for parts in row:
             for part in parts.values():
@@ -142,18 +139,24 @@ def piecewise_waveform(
     held = [*census.coefficients, 1 / omega, *ring_values(lengths)]
     ring = CoefficientRing.holding(sp.expand(value) for value in held)
     units = tuple(sp.Mul(sp.Rational(1, q), unit) for unit, q in census.units.items())
-    reader = Reader(_LOCAL, ring, dict(zip(census.units, range(len(units)), strict=True)), census.units, omega)
+    reader = Reader(_local(), ring, dict(zip(census.units, range(len(units)), strict=True)), census.units, omega)
     pieces = tuple(_piece(row, reader, ring, omega) for row in split)
     return PiecewiseWaveform(pieces, ring, units, omega, tuple(ends), len(split[0]), tuple(order))
 
 
+@cache
+def _local() -> sp.Symbol:
+    """Time within a piece."""
+    return sp.Symbol("s", real=True)
+
+
 def _by_powers(formula: sp.Expr) -> dict[int, sp.Expr]:
     """power of s -> coefficient, which holds s in sines and cosines alone."""
-    collected = sp.collect(sp.expand(formula), _LOCAL, evaluate=False)
+    collected = sp.collect(sp.expand(formula), _local(), evaluate=False)
     parts: dict[int, sp.Expr] = {}
     for monomial, coefficient in collected.items():
-        power = sp.degree(monomial, _LOCAL) if monomial.has(_LOCAL) else 0
-        if monomial != _LOCAL**power:
+        power = sp.degree(monomial, _local()) if monomial.has(_local()) else 0
+        if monomial != _local() ** power:
             raise NotTrigonometricError(str(formula))
         parts[int(power)] = coefficient
     return parts

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.trig_signal import TrigSignal

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-
-import sympy as sp
+from typing import TypeAlias
 
 from lie_codegen.errors import InputError
-from lie_codegen.signals.periodic_input import TIME, PeriodicInput
+from lie_codegen.exact.expression import time_symbol
+from lie_codegen.on_demand import sympy as sp
+from lie_codegen.signals.periodic_input import PeriodicInput
 
 #: (power of tau, harmonic) -> coefficient.
-Terms = Mapping[tuple[int, int], sp.Expr]
+Terms: TypeAlias = "Mapping[tuple[int, int], sp.Expr]"
 
 
 @dataclass(frozen=True)
@@ -109,15 +110,15 @@ def fourier_terms(u: PeriodicInput) -> tuple[TimePolynomial, ...]:
 def _parse(expression: sp.Expr, period: sp.Expr) -> TimePolynomial:
     pairs: list[tuple[tuple[int, int], sp.Expr]] = []
     for term in sp.Add.make_args(expression):
-        factor, wave = term.as_independent(TIME, as_Add=False)
+        factor, wave = term.as_independent(time_symbol(), as_Add=False)
         if wave == 1:
             pairs.append(((0, 0), factor))
             continue
         if not isinstance(wave, sp.sin | sp.cos):
             raise InputError(f"{wave} is no sine or cosine")
         argument = sp.expand(wave.args[0])
-        phase = argument.xreplace({TIME: sp.S.Zero})
-        ratio = sp.simplify((argument - phase) / TIME * period / (2 * sp.pi))
+        phase = argument.xreplace({time_symbol(): sp.S.Zero})
+        ratio = sp.simplify((argument - phase) / time_symbol() * period / (2 * sp.pi))
         if not ratio.is_Integer:
             raise InputError(f"{wave} is not periodic with period {period}")
         n, half = int(ratio), factor / 2

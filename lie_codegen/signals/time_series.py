@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.signals.input_formulas import TIME
+from lie_codegen.exact.expression import time_symbol
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 
@@ -21,7 +21,7 @@ def expressions_of(u: PeriodicInput, calculus: Any, signals: Sequence[Any]) -> t
     """
     waveform = u.waveform
     return tuple(
-        waveform.expressions(calculus, signal, u.dim, TIME) / waveform.omega**q
+        waveform.expressions(calculus, signal, u.dim, time_symbol()) / waveform.omega**q
         for q, signal in enumerate(signals, start=1)
     )
 

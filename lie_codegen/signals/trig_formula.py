@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import sympy as sp
-
 from lie_codegen.errors import PeriodError
 from lie_codegen.exact.budget import Meter
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.trig_signal import TrigSignal

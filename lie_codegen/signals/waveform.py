@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.sampled_signal import Panels, SampledCalculus
 from lie_codegen.signals.signal_values import expressions_of, integral_of, table_of

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -24,6 +23,7 @@ from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
 from lie_codegen.values import Value

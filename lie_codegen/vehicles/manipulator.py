@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number
@@ -20,6 +18,7 @@ from lie_codegen.identifiers import shown
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.vehicles.riemannian import coriolis
 
 _KINDS = ("augmented_pd", "computed_torque")

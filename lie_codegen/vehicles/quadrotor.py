@@ -19,12 +19,9 @@ import random
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import sympy as sp
-
-from lie_codegen.control.reference_motion import TIME
 from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.positive_matrix import body_inertia, positive_number
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
@@ -45,9 +42,10 @@ from lie_codegen.kernel.linear import (
     transpose,
 )
 from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
+from lie_codegen.on_demand import sympy as sp
 
 #: Standard gravity [m/s^2].
-GRAVITY = sp.Rational("9.80665")
+GRAVITY = "9.80665"
 _GAINS = ("k_x", "k_v", "k_R", "k_W")
 _REFERENCE = ("x_d", "v_d", "a_d", "j_d", "s_d", "b_1d", "b_1d_dot", "b_1d_ddot")
 
@@ -136,15 +134,15 @@ def flat_reference(position: Sequence[Any], heading: Any = 0, name: str = "flat_
     """
     if isinstance(position, str) or len(position) != 3:
         raise InputError("a flat reference needs three formulas of t for the position")
-    names = {"t": TIME, "pi": sp.pi}
+    names = {"t": time_symbol(), "pi": sp.pi}
     path = [parse_expression(str(p), names, FORMULA_FUNCTIONS) for p in position]
     psi = parse_expression(str(heading), names, FORMULA_FUNCTIONS)
-    curves = [[sp.diff(p, TIME, order) if order else p for p in path] for order in range(5)]
+    curves = [[sp.diff(p, time_symbol(), order) if order else p for p in path] for order in range(5)]
     first = [sp.cos(psi), sp.sin(psi), sp.S.Zero]
-    curves += [[sp.diff(b, TIME, order) if order else b for b in first] for order in range(3)]
+    curves += [[sp.diff(b, time_symbol(), order) if order else b for b in first] for order in range(3)]
 
     def body(ops: Arithmetic, t: Scalar) -> tuple[Any, ...]:
-        evaluate = ExpressionEvaluator(ops, {TIME: t})
+        evaluate = ExpressionEvaluator(ops, {time_symbol(): t})
         return tuple([evaluate(entry) for entry in curve] for curve in curves)
 
     units = ("m", "m/s", "m/s^2", "m/s^3", "m/s^4", "", "1/s", "1/s^2")

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy as sp
-
 from lie_codegen.errors import ShapeError
+from lie_codegen.on_demand import sympy as sp
 
 
 def christoffel(M: sp.MatrixBase, q: Sequence[sp.Symbol]) -> tuple[sp.ImmutableMatrix, ...]:
@@ -80,7 +79,7 @@ def acceleration(
     q: Sequence[sp.Symbol],
     velocity: Sequence[sp.Expr],
     force: Sequence[sp.Expr],
-    potential: sp.Expr = sp.S.Zero,
+    potential: sp.Expr | int = 0,
 ) -> list[sp.Expr]:
     """q'' of M q'' + C q' + dV = F."""
     bias = coriolis(M, q, velocity) * sp.Matrix(list(velocity)) + sp.Matrix([sp.diff(potential, x) for x in q])

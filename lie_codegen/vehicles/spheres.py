@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy as sp
+from lie_codegen.on_demand import sympy as sp
 
 
 def projection(q: Sequence[sp.Expr]) -> sp.Matrix:

@@ -17,8 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import eigenvalues, positive_matrix, real_number, symmetric_matrix
@@ -28,6 +26,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, ad_star, constant_matrix, cross, dot, matvec, minus, number, plus, scaled
+from lie_codegen.on_demand import sympy as sp
 
 _RIGID = ("w1", "w2", "w3", "v1", "v2", "v3")
 

@@ -15,9 +15,9 @@ the other factor. Along X' = X hat(u + w), w white of density Q: S' = -ad_u S - 
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 
 from lie_codegen.arrays import Array
+from lie_codegen.on_demand import scipy
 
 
 def compounded(ads: Array, first: Array, second: Array, order: int) -> tuple[Array, Array]:

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import dot
+from lie_codegen.on_demand import sympy as sp
 
 #: The first term left out is below 1e-19.
 TERMS = 15

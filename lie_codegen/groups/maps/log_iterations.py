@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 
 from lie_codegen.arrays import Array
+from lie_codegen.on_demand import scipy
 
 
 def unitary_log(X: Array, *, special: bool) -> Array:

@@ -13,11 +13,11 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-import scipy.linalg
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.log_iterations import matrix_log
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import scipy
 
 #: Random elements of z tried, logarithms found before the search ends, and turns on either side.
 TRIES, ENOUGH, TURNS = 30, 3, 2

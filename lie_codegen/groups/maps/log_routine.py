@@ -22,7 +22,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
@@ -42,6 +41,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matmul, matvec, total
 from lie_codegen.kernel.routine import Routine, call_routine
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
+from lie_codegen.on_demand import scipy
 
 #: The defect up to which a closed form is taken as it is: rounding.
 _ROUNDING = 1e-13

@@ -11,12 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import sympy as sp
-
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.exact.block_structure import diagonal_blocks, is_block_diagonal
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 #: The entries of a 4 x 4 matrix that the closed forms of SO(4) and SO(3, 1) give.
 PLANES = ((1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2))

@@ -18,8 +18,6 @@ from fractions import Fraction
 from math import factorial
 from typing import Any, Protocol
 
-import sympy as sp
-
 from lie_codegen.exact.quadratic_form import QuadraticForm
 from lie_codegen.exact.spectral_pattern import ColumnPattern
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -27,6 +25,7 @@ from lie_codegen.kernel.cotangent import CotangentFunctions, taylor
 from lie_codegen.kernel.linear import number
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.kernel.stumpff import StumpffFunctions, derivative_weights
+from lie_codegen.on_demand import sympy as sp
 
 #: (odd, a, order): the tail after a Taylor terms of the even or odd part, differentiated.
 Tail = tuple[bool, int, int]

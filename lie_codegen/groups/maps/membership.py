@@ -19,13 +19,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 #: Relative size of a singular value that counts as zero; the entries are exact numbers of moderate size.
 _RANK = 1e-9

@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.linalg
-import scipy.optimize
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -26,6 +24,7 @@ from lie_codegen.errors import InputError, NotFiniteError, NotOnGroupError, Shap
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.catalogue_load import group as load_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import scipy
 
 _STEPS = 200
 _HALVINGS = 40

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.derivation import GroupDerivation
@@ -37,6 +36,7 @@ from lie_codegen.kernel.linear import (
     transpose,
 )
 from lie_codegen.kernel.structural_zeros import add, product
+from lie_codegen.on_demand import sympy as sp
 
 
 def renormalised(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Matrix:

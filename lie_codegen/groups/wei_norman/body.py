@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.algebra.adjoint import ad
 from lie_codegen.exact.exponential import MatrixExponential, matrix_exponential
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -25,6 +23,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import SparseMatrix
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.structural_zeros import add, product
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

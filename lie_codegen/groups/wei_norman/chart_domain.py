@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
-import sympy as sp
 from numpy.typing import NDArray
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
@@ -17,6 +15,8 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.chart_end import End, chart_end, escaping_input
 from lie_codegen.groups.wei_norman.matrix import WeiNorman, wei_norman
+from lie_codegen.on_demand import scipy
+from lie_codegen.on_demand import sympy as sp
 
 #: Bases of up to this dimension are always treated exactly; of more, where a bracket has few terms (two at most in the catalogue).
 _ALWAYS_EXACT = 4

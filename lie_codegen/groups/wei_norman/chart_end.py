@@ -16,8 +16,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import sympy as sp
-
 from lie_codegen.algebra.cartan import is_maximal_compact
 from lie_codegen.algebra.ideal_chain import is_chain_order, is_ideal, is_subalgebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
@@ -26,6 +24,7 @@ from lie_codegen.algebra.subspace import brackets, whole
 from lie_codegen.exact.numbers import Number, domain_matrix, is_positive_definite
 from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import sympy as sp
 
 #: How the coordinates of a solution can end: not at all, at a zero of the determinant, by escape in finite time although the
 #: determinant never vanishes, or at a zero with an escape before it not excluded.

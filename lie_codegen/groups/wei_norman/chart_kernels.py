@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman import body as wei_norman_body
 from lie_codegen.groups.wei_norman.chart_domain import chart_domain
@@ -19,6 +17,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.on_demand import sympy as sp
 
 
 @kernel_factory()

@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.exact.newton_form import symmetric_sums
 from lie_codegen.exact.numbers import Number
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
+from lie_codegen.on_demand import sympy as sp
 
 
 class DividedDifferences:

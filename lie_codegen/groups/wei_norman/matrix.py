@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
 
-import sympy as sp
-
 from lie_codegen.algebra.adjoint import ad
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -26,6 +24,7 @@ from lie_codegen.groups.wei_norman.ring_solve import combination, dense, determi
 from lie_codegen.groups.wei_norman.trigonometric_ring import Element, TrigonometricRing
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.block_solve import SparseMatrix, blocks_of
+from lie_codegen.on_demand import sympy as sp
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations
 
-import sympy as sp
-
 from lie_codegen.algebra.ideal_chain import adapted_basis, chain_order, is_ideal, is_subalgebra
 from lie_codegen.algebra.structure import structure
 from lie_codegen.algebra.subspace import Subspace, Vector
@@ -19,6 +17,7 @@ from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.chart_domain import ChartDomain, chart_domain, is_generic
 from lie_codegen.groups.wei_norman.chart_end import combination_text, is_compact
+from lie_codegen.on_demand import sympy as sp
 
 _RANK = {"never": 0, "walls": 1, "either": 2, "escape": 3}
 #: Up to this dimension every order is tried.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from math import prod
-
-import sympy as sp
-from sympy.polys.domains import QQ
+from typing import TypeAlias
 
 from lie_codegen.groups.wei_norman.trigonometric_ring import Element, TrigonometricRing
+from lie_codegen.on_demand import sympy as sp
 
-_Factor = tuple[Element, list[sp.Expr], int]
+_Factor: TypeAlias = "tuple[Element, list[sp.Expr], int]"
 #: Coefficients of the norm (a dense polynomial over Q) above which polynomials over an irrational field are not factored.
 _LARGE = 2000
 
@@ -51,7 +50,7 @@ def _factor_list(ring: TrigonometricRing, element: Element, shown: list[sp.Expr]
     monic = element.mul_ground(ring.domain.one / leading)
     if ring.domain.is_Algebraic:
         if all(ring.domain.to_sympy(value).is_Rational for value in monic.values()):
-            rational = monic.set_ring(ring.ring.clone(domain=QQ))
+            rational = monic.set_ring(ring.ring.clone(domain=sp.polys.domains.QQ))
             constant, found = rational.factor_list()
             found = [(factor.set_ring(ring.ring), multiplicity) for factor, multiplicity in found]
             constant = sp.Rational(constant.numerator, constant.denominator)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sympy as sp
-
 from lie_codegen.groups.wei_norman.ring_factors import factored, without_decay
 from lie_codegen.groups.wei_norman.trigonometric_ring import Element, TrigonometricRing
+from lie_codegen.on_demand import sympy as sp
 
 
 def fraction(ring: TrigonometricRing, numerator: Element, denominator: Element) -> tuple[Element, Element]:

@@ -12,13 +12,11 @@ from collections.abc import Iterable, Sequence
 from math import comb
 from typing import Any
 
-import sympy as sp
-from sympy.polys.rings import PolyElement, ring
-
 from lie_codegen.errors import ComputationError
 from lie_codegen.exact.budget import Meter
 from lie_codegen.exact.exponential import MatrixExponential
 from lie_codegen.exact.numbers import Number, exact_number, field_elements
+from lie_codegen.on_demand import sympy as sp
 
 #: An element of the ring in reduced form.
 Element = Any
@@ -55,9 +53,9 @@ class TrigonometricRing:
         ordered = sorted(numbers, key=sp.default_sort_key)
         self.domain, elements = field_elements(ordered)
         self._known = dict(zip(ordered, elements, strict=True))
-        self.ring, *generators = ring([sp.Dummy() for _ in shown], self.domain)
+        self.ring, *generators = sp.polys.rings.ring([sp.Dummy() for _ in shown], self.domain)
         self._count_products()
-        self.generators: list[PolyElement] = generators
+        self.generators: list[Element] = generators
         self.coordinates = tuple(generators[: len(self.symbols)])
         self._sines = tuple(position + 1 for position in self.cosine.values())
         self.pairs = tuple((position, position + 1) for position in self._growth.values())

@@ -10,10 +10,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.on_demand import scipy
 from lie_codegen.steering.closed_form.averaged_end import TABULATED, averaged_end
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.fourier import Family
@@ -193,7 +193,7 @@ def _least_energy(
                     constraints.append(
                         {"type": "ineq", "fun": lambda c, o=offset, M=matrix: o + M @ c, "jac": lambda c, M=matrix: M}
                     )
-    result = minimize(
+    result = scipy.optimize.minimize(
         lambda c: (float(weights @ (c * c)), 2 * weights * c),
         c,
         jac=True,

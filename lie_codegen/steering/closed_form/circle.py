@@ -18,11 +18,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.on_demand import scipy
 from lie_codegen.steering.closed_form.endpoint import approach, flow_end, sharpen
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status, Stretched
@@ -121,7 +121,7 @@ def circle_law(chord: Array, area: float) -> Array:
         return float((theta - np.sin(theta)) * length**2 - 8 * size * np.sin(theta / 2) ** 2)
 
     shallow = 12 * size / length**2
-    theta = float(brentq(excess, min(shallow, np.pi) / 4, 2 * np.pi, xtol=1e-15))
+    theta = float(scipy.optimize.brentq(excess, min(shallow, np.pi) / 4, 2 * np.pi, xtol=1e-15))
     radius = length / (2 * np.sin(theta / 2)) if theta < np.pi else np.sqrt(2 * size / (theta - np.sin(theta)))
     theta = float(np.copysign(theta, area))
     phi = np.arctan2(chord[1], chord[0]) - theta / 2

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 
-from scipy.linalg import expm
-
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.flow.logarithm import matrix_log
+from lie_codegen.on_demand import scipy
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop
 from lie_codegen.steering.finish import finish
@@ -71,7 +70,7 @@ def _retuned(task: Task, chain: Chain) -> Chain:
     best = found if off < _EXACT else None
     x, miss = matrix_log(group, task.target)
     for rounds in _ROUNDS if miss < _ON_GROUP else ():
-        root = expm(group.hat(x / rounds))
+        root = scipy.linalg.expm(group.hat(x / rounds))
         found, off = Chain.towards(group, task.controls, x / rounds).repeated(rounds).retuned(root)
         hit = found if off < _EXACT / rounds else None
         if best is not None:

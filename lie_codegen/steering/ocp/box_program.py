@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from lie_codegen.arrays import Array
+from lie_codegen.on_demand import scipy
 
 _EPSILON = float(np.finfo(float).eps)
 

@@ -6,12 +6,12 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from lie_codegen.errors import AssumptionWarning, InputError, ShapeError
 from lie_codegen.groups.maps.element_pattern import packed_size, unpack
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.ocp.layout import entry_names
 from lie_codegen.steering.ocp.problem_data import ProblemData, SecondOrder, total_square
 from lie_codegen.steering.ocp.terms import Point, Term

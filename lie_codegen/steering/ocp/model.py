@@ -17,8 +17,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
-
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import vee
@@ -28,6 +26,7 @@ from lie_codegen.groups.maps.rkmk import bracket_body, hat_body
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import ad_star, matmul
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.ocp.problem_data import ProblemData, total_square
 from lie_codegen.steering.ocp.terms import Point, derivation
 

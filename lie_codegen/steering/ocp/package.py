@@ -9,12 +9,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from lie_codegen.codegen.opcodes import REALS
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.write import GENERATOR
 from lie_codegen.errors import CodegenError
+from lie_codegen.on_demand import scipy
 from lie_codegen.steering.ocp.budget import Budget, budget_of
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
@@ -94,7 +94,7 @@ def make_vectors(
     x, vectors = np.array(space["x"][0, 0]), []
     for k in range(min(_SAMPLES, data.intervals)):
         X, z = unpack_elements(data, x[None])
-        element = X[0] @ expm(data.group.hat(_NOISE * rng.normal(size=data.group.dim)))
+        element = X[0] @ scipy.linalg.expm(data.group.hat(_NOISE * rng.normal(size=data.group.dim)))
         states = z[0] + _NOISE * rng.normal(size=len(z[0]))
         u = np.zeros(data.inputs.size)
         machine.step(space, element, states, rows, k * h, iterations, u)

@@ -10,7 +10,6 @@ from math import prod
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.errors import ExpressionError, InputError, ShapeError
 from lie_codegen.groups.derivation import GroupDerivation
@@ -23,6 +22,7 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.matrix_formula import formula, scalar_formula
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.steering.ocp.layout import Layout, Shape, entry_names
 
 #: A text in the matrix grammar, or a Kernel whose ports are matched by name.

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi as ca
-
 from lie_codegen.groups.maps.element_pattern import pack, unpack
 from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import pushed

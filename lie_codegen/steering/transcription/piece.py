@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
-
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.transcription.structure import Structure
 
 

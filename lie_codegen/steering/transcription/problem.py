@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.steering.transcription.listener import Listener
 from lie_codegen.steering.transcription.path import path

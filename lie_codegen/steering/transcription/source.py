@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
-
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.steering.transcription.nlp_source import Condition, Layout, render_nlp
 from lie_codegen.steering.transcription.path import path

@@ -14,7 +14,6 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from lie_codegen.groups.maps.element_pattern import pack, unpack
@@ -22,6 +21,7 @@ from lie_codegen.groups.maps.rkmk import bracket_body, sum_products, times_taylo
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.mechanics.driven_step import driven_increments
+from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import ad_matrix, push, pushed, wedge

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.on_demand import casadi as ca
 
 
 def push(group: MatrixGroup, B: Array) -> tuple[Any, Any]:

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -15,6 +14,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.mechanics.body_frame import body_frame
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import Value
 
 

@@ -15,8 +15,6 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
-import sympy as sp
-
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
@@ -29,6 +27,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, cross, matvec, minus, plus, scaled, transpose
 from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.mechanics.body_frame import body_frame
+from lie_codegen.on_demand import sympy as sp
 
 #: Taylor terms of exp(-hat theta) at a stage: the error is of the sixth order, below that of the step.
 _STAGE_TERMS = 5

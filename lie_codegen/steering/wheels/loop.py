@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
@@ -25,6 +24,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, matmul, matvec, plus
 from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.mechanics.states import initial_states
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.steering.wheels.body import WheeledBody
 from lie_codegen.steering.wheels.kernels import Body, allocation_rows, arguments_of, torque_step
 from lie_codegen.steering.wheels.motion import (

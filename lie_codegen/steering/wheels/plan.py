@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
@@ -19,6 +18,7 @@ from lie_codegen.groups.build import build
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.body_frame import body_frame
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.ocp.front import ocp
 from lie_codegen.steering.plan import Plan, Status

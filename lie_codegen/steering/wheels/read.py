@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.body_frame import body_frame
+from lie_codegen.on_demand import sympy as sp
 
 
 def read_directions(group: MatrixGroup, axes: Any) -> sp.ImmutableMatrix:

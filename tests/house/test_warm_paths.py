@@ -1,0 +1,55 @@
+"""What has been made before is found by its definition: a fresh process with a warm cache derives nothing, and imports nothing to derive with."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lie_codegen.runtime.compiler import find_compilers
+
+pytestmark = pytest.mark.skipif(not find_compilers(), reason="no C compiler")
+
+START = (
+    "import sys, numpy as np, lie_codegen as lc; TARGET = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]; T = np.linspace(0, 1, 5)"
+)
+LAW = "lc.attitude_law('pd', inertia=(1, 2, 3), k_p=4, k_d=3)"
+HEAVY = ("casadi", "jinja2", "scipy", "sympy")
+#: What a user asks for first -> what it may still import of HEAVY.
+PATHS = {
+    "import lie_codegen.control.closed_loop, lie_codegen.steering.front, lie_codegen.flow.simulate": (),
+    "lc.build('so3').exp([0.1, 0.2, 0.3])": (),
+    "lc.generate('so3', 'so3')": (),
+    "lc.group('se3').hat([1, 2, 3, 4, 5, 6])": ("sympy",),
+    f"lc.build({LAW})": ("sympy",),
+    f"lc.generate({LAW}, 'law')": ("sympy",),
+    f"lc.closed_loop('so3', law={LAW}, inertia=(1, 2, 3), X0=TARGET, t=T, step=0.01)": ("sympy",),
+    "lc.steer('so3', TARGET, controls=[0, 1], duration=1.0)": ("sympy",),
+    "lc.simulate('so3', ['sin(t)', 'cos(t)', '1'], t=T)": ("sympy",),
+    "lc.simulate('so3', np.ones((5, 3)), t=T)": ("sympy",),
+    "lc.reference('so3', ['sin(t)', '0', '1'])": ("sympy",),
+    "lc.PeriodicInput(['sin(t)', '1'])": ("sympy",),
+}
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which everything has been asked for once."""
+    folder = tmp_path_factory.mktemp("warm")
+    run(folder, "\n".join(PATHS))
+    return folder
+
+
+def run(folder: Path, code: str) -> str:
+    """A process of its own, in a folder with a cache of its own: that of the whole run evicts."""
+    environment = {**os.environ, "LIE_CODEGEN_CACHE": str(folder / "cache")}
+    command = [sys.executable, "-c", f"{START}\n{code}\nprint(*sorted(set({HEAVY}) & set(sys.modules)))"]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("code", PATHS)
+def test_nothing_heavy_is_imported_where_the_cache_has_it(warm: Path, code: str) -> None:
+    assert set(run(warm, code).split()) <= set(PATHS[code])
