@@ -1,4 +1,5 @@
-"""The door of a subject: its public names, imported when first used, and nothing but errors of ours passes out through them.
+"""The door of a subject: its public names, imported when first used, and nothing but errors of ours passes out through them; warnings point
+at the line of the user's that called.
 
 What a function was not written for (a text in place of an array, a number of 5,000 digits) fails somewhere inside, in NumPy or SymPy, with
 a TypeError, a ValueError, an OverflowError ... At the door such an error becomes an `ArgumentError` that names the function and
@@ -11,6 +12,7 @@ import enum
 import functools
 import sys
 import types
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -83,16 +85,34 @@ def _guard(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     return guarded
 
 
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warn at the line of the user's code that led here, however many functions of ours lie between (a stacklevel would have to count them).
+
+    The nearest frame that is not ours, of Python's own library or of what we compute with; the outermost if there is none.
+    """
+    frame = sys._getframe(1)
+    while _belongs_inside(frame) and frame.f_back is not None:
+        frame = frame.f_back
+    there = frame.f_globals
+    registry = there.setdefault("__warningregistry__", {})
+    module = str(there.get("__name__", "<string>"))
+    warnings.warn_explicit(message, category, frame.f_code.co_filename, frame.f_lineno, module, registry)
+
+
 def _is_inside(error: Exception) -> bool:
-    """Whether every frame the error came through is ours, of Python's own library or of what we compute with."""
+    """Whether every frame the error came through is inside."""
     trace = error.__traceback__
     while trace is not None:
-        root = str(trace.tb_frame.f_globals.get("__name__", "")).partition(".")[0]
-        # Code made by lambdify has no module.
-        if root and root not in _INSIDE and root not in sys.stdlib_module_names:
+        if not _belongs_inside(trace.tb_frame):
             return False
         trace = trace.tb_next
     return True
+
+
+def _belongs_inside(frame: types.FrameType) -> bool:
+    """Whether a frame is ours, of Python's own library or of what we compute with; code made by lambdify has no module."""
+    root = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+    return not root or root in _INSIDE or root in sys.stdlib_module_names
 
 
 def _given(args: tuple[Any, ...], named: dict[str, Any]) -> str:

@@ -1,12 +1,13 @@
 """Every error the package raises on purpose.
 
 Two families: `InputError` (what was given is wrong; the command line exits with status 2) and
-`ComputationError` (the input was right and the computation failed; exit status 1). A message says
+`ComputationError` (the input was right, and the computation failed or the system refused; exit status 1). A message says
 what is wrong, where, and how to mend it.
 """
 
 from __future__ import annotations
 
+import errno
 from typing import Any
 
 #: Characters of a message that are shown: what was given may be quoted in it, whatever its length.
@@ -145,6 +146,16 @@ class MissingDependencyError(ComputationError):
 
 class SystemRefusalError(ComputationError):
     """The system refuses a file, a process or memory; names the function, with the system's error as its cause."""
+
+
+#: What no other name of a file mends: a full disk, a quota, a device that fails, no memory, no more files.
+_OF_THE_SYSTEM = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE}
+
+
+def write_refusal(what: str, error: OSError) -> LieCodegenError:
+    """The error of a file or folder that cannot be written: the caller's choice of it (status 2), or the system that is out of something (1)."""
+    kind = SystemRefusalError if error.errno in _OF_THE_SYSTEM else OutputFolderError
+    return kind(f"{what}: {error.strerror or error}")
 
 
 class CacheError(ComputationError):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas, moments
 from lie_codegen.averaging.nilpotent import nilpotency_step
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionError, AssumptionWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.expression import time_symbol
 from lie_codegen.flow.batched_exponential import expm
@@ -249,11 +250,10 @@ def _warn_of_jumps(u: PeriodicInput, form: str) -> None:
     if u.jumps:
         theorem = _THEOREMS.get(form, "Theorem 2 (first order)")
         times = ", ".join(f"{b:g}" for b in u.jumps[:4])
-        warnings.warn(
+        warn_caller(
             f"{theorem} of TR 93-59 asks for continuous derivatives; this input jumps or bends at t = {times}. The "
             "averages are those of the bounded, piecewise smooth input; check their order with order_check",
             AssumptionWarning,
-            stacklevel=3,
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.averaged import average
 from lie_codegen.averaging.chart_limit import chart_end
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.flow.attitude_metrics import METRICS, distances
 from lie_codegen.flow.reference_flow import ReferenceFlow, reference_flow
@@ -109,11 +109,10 @@ def order_check(
     averaged = average(group, u, order, form)
     end = chart_end(averaged, values[0], horizon)
     if end is not None:
-        warnings.warn(
+        warn_caller(
             f"order_check: for eps = {values[0]:g} the secular exponent of the {form} form leaves its chart at t = {end:.4g}, "
             f"before b / eps = {horizon / values[0]:.4g}; the theorem claims nothing beyond (the numbers below are measured)",
             AssumptionWarning,
-            stacklevel=2,
         )
     sup, whole = measure(group, u, averaged.state, values, horizon, metric)
     return order_report(

@@ -62,7 +62,7 @@ def _show_warning(message: Any, *rest: Any, **named: Any) -> None:
 
 
 def main() -> None:
-    """Entry point: exit status 2 for bad input with one line, 1 for a computation that failed."""
+    """Entry point: exit status 2 for bad input with one line, 1 for a computation that failed or a system that refuses."""
     warnings.showwarning = cast(Any, _show_warning)
     try:
         sys.exit(app(standalone_mode=False))

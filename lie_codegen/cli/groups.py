@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from lie_codegen.cli.output import emit
-from lie_codegen.errors import OutputFolderError
+from lie_codegen.errors import OutputFolderError, write_refusal
 from lie_codegen.identifiers import check_identifier
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -119,7 +119,7 @@ def new(
     except FileExistsError:
         raise OutputFolderError(f"{path} exists already; choose another --out") from None
     except OSError as error:
-        raise OutputFolderError(f"{path} cannot be written: {error.strerror or error}") from None
+        raise write_refusal(f"{path} cannot be written", error) from None
     emit(f"wrote {path}; edit it, then: lie-codegen check {path}", {"file": path}, json)
 
 

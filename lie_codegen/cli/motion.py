@@ -11,7 +11,7 @@ import typer
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit, progress
 from lie_codegen.cli.steering import steer
-from lie_codegen.errors import InputError, OutputFolderError
+from lie_codegen.errors import InputError, write_refusal
 
 _Optional = typer.Option
 _MOST_SAMPLES = 10_000_000
@@ -65,7 +65,7 @@ def _write_csv(path: Path, t: Any, X: Any) -> None:
     try:
         np.savetxt(path, np.column_stack([t, flat]), delimiter=",", header="t, entries of X row by row", fmt="%.17g")
     except OSError as error:
-        raise OutputFolderError(f"{path} cannot be written: {error.strerror or error}") from None
+        raise write_refusal(f"{path} cannot be written", error) from None
 
 
 def reproduce(

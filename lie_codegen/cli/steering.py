@@ -10,7 +10,7 @@ import typer
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
 from lie_codegen.cli.steering_texts import limits_of, numbers, obstacle_ball, obstacle_cone, target_of, via_point
-from lie_codegen.errors import OutputFolderError
+from lie_codegen.errors import write_refusal
 
 _Optional = typer.Option
 _LIMITS = "one number, low:high, or label=either, comma-separated."
@@ -137,4 +137,4 @@ def _saved(plan: Any, path: Path) -> Path:
     try:
         return Path(plan.save(path)).resolve()
     except OSError as error:
-        raise OutputFolderError(f"--save {path}: {error.strerror or error}") from None
+        raise write_refusal(f"--save {path}", error) from None

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from lie_codegen.errors import OutputFolderError
+from lie_codegen.errors import OutputFolderError, write_refusal
 
 #: The value of "generator" in manifest.json by which a folder is known as ours.
 GENERATOR = "lie_codegen"
@@ -35,13 +35,13 @@ def write_package(tree: Mapping[str, str], folder: str | Path) -> Path:
         target.parent.mkdir(parents=True, exist_ok=True)
         fresh = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
     except OSError as error:
-        raise OutputFolderError(f"cannot write {folder}: {error.strerror or error}; choose another folder") from error
+        raise write_refusal(f"cannot write {folder}", error) from error
     try:
         _write_tree(tree, fresh)
         _swap(fresh, target, replaced)
     except OSError as error:
         _remove(fresh, tree)
-        raise OutputFolderError(f"cannot write {folder}: {error.strerror or error}; choose another folder") from error
+        raise write_refusal(f"cannot write {folder}", error) from error
     return target
 
 

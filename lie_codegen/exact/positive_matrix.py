@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import InertiaWarning, InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.on_demand import sympy as sp
@@ -117,11 +117,10 @@ def body_inertia(value: Any, what: str = "inertia") -> sp.ImmutableMatrix:
     matrix = positive_matrix(value, 3, what)
     small, middle, large = eigenvalues(matrix)
     if large > (small + middle) * (1 + _RELATIVE):
-        warnings.warn(
+        warn_caller(
             f"{what}: the principal moments {_listed(np.array([small, middle, large]))} violate the triangle "
             "inequality, so no rigid body has them; the laws hold all the same",
             InertiaWarning,
-            stacklevel=3,
         )
     return matrix
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError, SlowWarning
 from lie_codegen.flow.events import Event, event_function
 from lie_codegen.flow.events import Function as EventFunction
@@ -142,11 +142,10 @@ def _feedback_run(
             f"simulate({group.name}): give one number of trajectories; X0 has {len(start)}, eps has {len(eps)}"
         )
     if law.slow:
-        warnings.warn(
+        warn_caller(
             f"simulate({group.name}): u(t, {law.reads}) is a Python function, which is called at every stage of every step: slow, a "
             "thousand times slower than texts or a Kernel, which run in compiled loops",
             SlowWarning,
-            stacklevel=4,
         )
     return feedback_flow(group, law, times, eps, start, rtol=rtol, atol=atol, threads=threads)
 

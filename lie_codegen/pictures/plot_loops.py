@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, OutputFolderError
+from lie_codegen.errors import InputError, write_refusal
 from lie_codegen.pictures.plot_plan import picture_path
 from lie_codegen.pictures.result import new_figure
 
@@ -52,7 +52,7 @@ def plot_loops(run: Any, path: str | Path, *, band: Sequence[float] = (5, 95)) -
         target.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(target, dpi=150)
     except OSError as failure:
-        raise OutputFolderError(f"{target}: cannot be written: {failure.strerror or failure}") from None
+        raise write_refusal(f"{target}: cannot be written", failure) from None
     return target
 
 

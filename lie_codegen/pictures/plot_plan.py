@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from lie_codegen.errors import InputError, OutputFolderError
+from lie_codegen.errors import InputError, write_refusal
 from lie_codegen.pictures.steering_picture import draw_plan
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.front import steer
@@ -50,5 +50,5 @@ def plot_plan(plan: Plan, path: str | Path, *, obstacles: Sequence[Obstacle] = (
         target.parent.mkdir(parents=True, exist_ok=True)
         draw_plan(plan, minimum, obstacles).savefig(target, dpi=150)
     except OSError as error:
-        raise OutputFolderError(f"{target}: cannot be written: {error.strerror or error}") from None
+        raise write_refusal(f"{target}: cannot be written", error) from None
     return target

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import InputError, MissingDependencyError, OutputFolderError
+from lie_codegen.errors import InputError, MissingDependencyError, write_refusal
 
 #: The formats a figure can be written in; the dates left out, so that equal figures are equal files.
 FORMATS: dict[str, dict[str, None]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -57,7 +57,7 @@ def write_figure(figure: Any, path: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=150, metadata=FORMATS[path.suffix[1:]])
     except OSError as error:
-        raise OutputFolderError(f"{path.parent}: cannot be written: {error.strerror or error}") from None
+        raise write_refusal(f"{path.parent}: cannot be written", error) from None
     return path
 
 
@@ -71,7 +71,7 @@ def save(name: str, folder: Path, figure: Any, numbers: Mapping[str, Any]) -> Ga
     try:
         (folder / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
-        raise OutputFolderError(f"{folder}: cannot be written: {error.strerror or error}") from None
+        raise write_refusal(f"{folder}: cannot be written", error) from None
     return GalleryResult(name, picture, numbers, figure)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, OutputFolderError
+from lie_codegen.errors import InputError, OutputFolderError, write_refusal
 from lie_codegen.pictures.result import new_figure
 from lie_codegen.pictures.steering_loops import COLOURS, GREY
 
@@ -62,8 +62,10 @@ def draw_study(
         return figure
     try:
         figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as error:
+    except ValueError as error:  # a format that matplotlib does not know
         raise OutputFolderError(f"{path}: cannot be written: {error}") from None
+    except OSError as error:
+        raise write_refusal(f"{path}: cannot be written", error) from None
     return Path(path)
 
 

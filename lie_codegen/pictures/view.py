@@ -14,7 +14,7 @@ import numpy as np
 from lie_codegen.averaging.averaged import Averaged
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.control.closed_loop import ClosedLoop
-from lie_codegen.errors import InputError, OutputFolderError
+from lie_codegen.errors import InputError, write_refusal
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.pictures.average_page import average_scene
@@ -100,7 +100,7 @@ def view(
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(page, encoding="utf-8")
     except OSError as error:
-        raise OutputFolderError(f"{target}: cannot be written: {error.strerror or error}") from None
+        raise write_refusal(f"{target}: cannot be written", error) from None
     return target
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionWarning, InputError, NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
@@ -186,10 +186,9 @@ def _fixed_axis(J: Array, moments: Array, omega: Array) -> NDArray[np.bool_]:
             "infinite; change omega a little"
         )
     if np.any(pure) and moments[1] - moments[0] > SPHERE * moments[2] and moments[2] - moments[1] > SPHERE * moments[2]:
-        warnings.warn(
+        warn_caller(
             "free_rotation: pure spin about the middle axis is unstable; the steady rotation is returned, which no real body keeps",
             AssumptionWarning,
-            stacklevel=3,
         )
     return np.asarray(rest | pure)
 

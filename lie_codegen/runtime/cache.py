@@ -17,7 +17,6 @@ import json
 import os
 import re
 import shutil
-import warnings
 import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.signature import Signature
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import CacheWarning
 from lie_codegen.runtime.compiler import compile_seconds
 
@@ -157,10 +157,9 @@ def lock(folder: Path, key: str) -> Iterator[None]:
 
 @functools.cache
 def _warn_held(folder: str, patience: float) -> None:
-    warnings.warn(
+    warn_caller(
         f"another process has held a lock of {folder} for {patience:g} s (LIE_CODEGEN_COMPILE_SECONDS); building beside it",
         CacheWarning,
-        stacklevel=4,
     )
 
 

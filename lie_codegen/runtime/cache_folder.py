@@ -6,10 +6,10 @@ import atexit
 import os
 import shutil
 import stat
-import warnings
 from functools import cache
 from pathlib import Path
 
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import CacheError, CacheWarning
 
 
@@ -83,10 +83,9 @@ def temporary_folder(reason: str) -> Path:
 
 @cache
 def _warn_once(reason: str) -> None:
-    warnings.warn(
+    warn_caller(
         f"{reason}. What is compiled now is lost with this process; set LIE_CODEGEN_CACHE to a folder of your own.",
         CacheWarning,
-        stacklevel=4,
     )
 
 

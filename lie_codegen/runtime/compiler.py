@@ -15,13 +15,13 @@ import shlex
 import shutil
 import signal
 import sys
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import CompileError, CompilerStoppedError, CompilerWarning, NoCompilerWarning
 
 #: -ffp-contract=off: the same numbers as the interpreter; never -ffast-math, which changes the whole process.
@@ -89,18 +89,17 @@ def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compil
 @cache
 def warn_no_compiler() -> None:
     """Say once a process that kernels will be interpreted."""
-    warnings.warn(
+    warn_caller(
         "no C compiler found ($CC, cc, gcc, clang, the ziglang package): kernels are interpreted, with the same "
         "results, more slowly. Install a compiler, or: pip install 'lie_codegen[zig]'",
         NoCompilerWarning,
-        stacklevel=3,
     )
 
 
 @cache
 def warn_passed_over(command: str, why: str) -> None:
     """Say once a process that a compiler is passed over; it may be the user's own choice, in $CC."""
-    warnings.warn(f"the C compiler {command!r} is passed over, {why}; the next is tried", CompilerWarning, stacklevel=3)
+    warn_caller(f"the C compiler {command!r} is passed over, {why}; the next is tried", CompilerWarning)
 
 
 def flags_for(statements: int) -> tuple[str, ...]:

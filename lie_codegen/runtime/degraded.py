@@ -9,11 +9,11 @@ again, and is fast if it succeeds.
 from __future__ import annotations
 
 import time
-import warnings
 from functools import cache as memoised
 from pathlib import Path
 from typing import Any
 
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import DegradedWarning
 from lie_codegen.runtime import cache
 
@@ -26,7 +26,7 @@ BATCHES = "batches run one sample at a time (the same results, two to eight time
 def warn_degraded(what: str, why: str) -> None:
     """Say once a process that something is slower than it could be."""
     first = why.strip().splitlines()[0] if why.strip() else "no reason given"
-    warnings.warn(f"{what}: {first}", DegradedWarning, stacklevel=4)
+    warn_caller(f"{what}: {first}", DegradedWarning)
 
 
 def refused_before(folder: Path, key: str) -> str | None:

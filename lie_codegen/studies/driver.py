@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import ComputationError, InputError, LieCodegenError
 from lie_codegen.studies.draws import noise_seed
 from lie_codegen.studies.engines import Engine, WorkerLostError
@@ -168,9 +168,7 @@ def drive(
         said = f"study: {len(messages)} of {store.chunks} chunks failed; chunk {first}: {messages[first]}"
         if finished == 0:
             raise ComputationError(said)
-        warnings.warn(
-            f"{said}; the others are in the store, and study called again tries these", FailedChunkWarning, stacklevel=3
-        )
+        warn_caller(f"{said}; the others are in the store, and study called again tries these", FailedChunkWarning)
 
 
 def _packed(job: Job) -> bytes:

@@ -217,3 +217,15 @@ def test_generate_takes_laws_a_plan_and_a_steering_solver(cli, tmp_path: Path) -
         assert done.returncode == 2, arguments
         assert words in done.stderr
         assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_what_the_system_refuses_is_no_fault_of_the_input(cli) -> None:
+    """Exit status 1 for a full disk, 2 for a place where nothing can be written."""
+    motion = ("simulate", "so3", "--u", "cos(t)", "--u", "0", "--u", "0", "--end", "1", "--out")
+    full, nowhere = cli(*motion, "/dev/full"), cli(*motion, "/dev/null/run.csv")
+    assert full.returncode == 1
+    assert "No space left" in full.stderr
+    assert nowhere.returncode == 2
+    assert "Not a directory" in nowhere.stderr
+    assert all(len(done.stderr.splitlines()) == 1 for done in (full, nowhere))

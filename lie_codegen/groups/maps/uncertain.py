@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError, SpreadWarning
 from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
@@ -204,9 +204,8 @@ def _warn_wide(estimate: Uncertain) -> None:
     reach = (3 * np.sqrt(np.maximum(values, 0)) * vectors).T
     angles = np.abs(np.linalg.eigvals(estimate.group.hat(reach)).imag)
     if np.max(angles, initial=0.0) > np.pi:
-        warnings.warn(
+        warn_caller(
             f"Uncertain on {estimate.group.name}: three deviations turn by {np.max(angles):.3g} rad, beyond the half turn where "
             "rotations meet again: the Gaussian is truncated there, which no formula here accounts for",
             SpreadWarning,
-            stacklevel=4,
         )

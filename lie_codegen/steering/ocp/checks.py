@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionWarning, InputError, ShapeError
 from lie_codegen.groups.maps.element_pattern import packed_size, unpack
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
@@ -70,9 +70,8 @@ def _check_controls(data: ProblemData, at: Point, cost: Any, path: Sequence[Any]
             )
         if not ca.depends_on(moves, symbol):
             raise InputError(f"{where}: the control {name} moves nothing and costs nothing; remove it")
-        warnings.warn(
+        warn_caller(
             f"{where}: the control {name} costs nothing: its best values lie on its bounds and jump (bang-bang); a small "
             f"cost of it makes the problem regular",
             AssumptionWarning,
-            stacklevel=4,
         )

@@ -6,7 +6,6 @@ the chain from stage to stage gives du_k/dp. Controls at a bound do not move; co
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from math import prod
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
@@ -64,11 +64,10 @@ def sensitivity(plan: Solution, name: str) -> Array:
     weak = weakly_active(plan)
     if weak:
         what, stage = weak[0]
-        warnings.warn(
+        warn_caller(
             f"{data.name}.sensitivity({name}): {what} at stage {stage} is active without pressing"
             f"{f', and {len(weak) - 1} more' if len(weak) > 1 else ''}: there the derivative is one-sided",
             AssumptionWarning,
-            stacklevel=3,
         )
     shape = dict(data.parameters.shapes)[name]
     extended = _extended(data, name)
