@@ -22,7 +22,7 @@ from lie_codegen.steering.start import placed, seen_from
 from lie_codegen.steering.task import Task, make_task
 
 #: Methods that move the target along the directions that a goal leaves free.
-_SET_METHODS = ("transcription",)
+_SET_METHODS = ("optimal", "transcription")
 
 
 def set_plan(

@@ -2,7 +2,7 @@
 
     minimise int_0^T sum_i w_i u_i^2 dt   subject to   X' = X sum_i u_i A_i,  X(0) = I,  X(T) = target
 
-First shooting on the Lie-Poisson equations from the area rule; where that fails, or hardly any starts agree on the cheapest, with
+To a set of goals besides <mu(T), F> = 0 along the directions F that it leaves free (transversality). First shooting on the Lie-Poisson equations from the area rule; where that fails, or hardly any starts agree on the cheapest, with
 ten times the starts; then, unless the residual is well below the tolerance, the direct transcription. What won, and what was
 tried, is in the plan's details.
 """
@@ -12,14 +12,14 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, SteeringError
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.finish import energy, flown_end
@@ -27,6 +27,7 @@ from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import SOLVED, Extremals
 from lie_codegen.steering.shooting.shooter import Shooter, shooter
+from lie_codegen.steering.shooting.transversal import Met, focal_times, met
 from lie_codegen.steering.task import Task
 from lie_codegen.values import Value
 
@@ -35,6 +36,8 @@ _MORE = 10
 _LONELY = 2
 _CONJUGATE = 1e-6
 _CLOSE = 0.01
+#: Elements of a set of goals, beside the one given, whose extremals are begun from.
+_ELSEWHERE = 2
 
 
 def optimal(
@@ -65,6 +68,8 @@ def optimal(
     solver = shooter(task.group, task.controls)
     w = solver.check_weights(weights)
     built = time.perf_counter()
+    if task.free is not None:
+        return _to_a_set(task, solver, w, starts, built - started, say)
     tried: list[str] = []
     first = solver.starts if starts is None else starts
     best: Extremals | None = None
@@ -88,6 +93,42 @@ def optimal(
     return least_energy(task, weights=w, tried=tuple(tried), progress=progress)
 
 
+def _to_a_set(
+    task: Task, solver: Shooter, weights: Array, starts: int | None, build: float, say: Callable[[str], None]
+) -> Plan:
+    """The cheapest extremal that meets the set transversally, from the extremals to its element given and to others of it."""
+    if task.free is None:
+        raise ValueError("a set of goals leaves directions free")
+    began = time.perf_counter()
+    tried: list[str] = []
+    best: tuple[float, Met, Extremals] | None = None
+    for number, element in enumerate(task.elements(_ELSEWHERE), start=1):
+        shot = solver.solve(element, weights=weights, starts=starts)
+        ends = met(lambda mu0: solver.extremal(mu0, weights=weights), shot.mu0[0], element, task.free)
+        cost = float(np.sum(ends.extremal.mu0[list(task.controls)] ** 2 / weights))
+        tried.append(
+            f"shooting to element {number} of the set, {shot.converged[0]} starts converged; along the set to cost "
+            f"{cost / task.duration:.6g}, miss {ends.miss:.1e}, transversality {ends.transversality:.1e}"
+        )
+        say(tried[-1])
+        if ends.converged and (best is None or cost < best[0]):
+            best = cost, ends, shot
+    if best is None:
+        raise SteeringError(
+            f"steer({task.group.name}): no extremal found that meets the set of goals transversally, which proves nothing: "
+            f'{"; ".join(tried)}; more starts, or method="direct"'
+        )
+    cost, ends, shot = best
+    found = replace(
+        shot,
+        mu0=ends.extremal.mu0[None],
+        cost=np.array([cost]),
+        residual=np.array([ends.miss]),
+    )
+    seconds = {"build": build, "solve": time.perf_counter() - began}
+    return _plan(replace(task, target=ends.target), solver, found, weights, tuple(tried), seconds)
+
+
 def _plan(
     task: Task, solver: Shooter, found: Extremals, weights: Array, tried: tuple[str, ...], seconds: dict[str, float]
 ) -> Plan:
@@ -103,6 +144,7 @@ def _plan(
         counts=tuple(int(each[0]) for each in (found.starts, found.converged, found.agreeing, found.linearisations)),
         tried=tried,
         seconds=seconds,
+        free=task.free,
     )
     return Plan(
         group=task.group,
@@ -129,6 +171,7 @@ class Shot(Value):
         counts: starts, converged, agreeing, linearisations.
         tried: what was tried, in words.
         seconds: spent so far.
+        free: (k, n) directions that the goal leaves free, None where it is an element.
     """
 
     controls: tuple[int, ...]
@@ -140,13 +183,14 @@ class Shot(Value):
     counts: tuple[int, ...]
     tried: tuple[str, ...]
     seconds: Mapping[str, float] = field(compare=False)
+    free: Array | None = None
 
     def of(self, plan: Plan) -> Facts:
         """The facts of the plan."""
         started = time.perf_counter()
         extremal = _extremal(plan.group, self.controls, tuple(self.mu0.tolist()), tuple(self.weights.tolist()))
         singular = extremal.singular_values()
-        conjugate = extremal.conjugate_times()
+        conjugate = extremal.conjugate_times() if self.free is None else focal_times(extremal, self.free)
         ratio = extremal.conjugacy()
         examined = time.perf_counter()
         starts, converged, agreeing, linearisations = self.counts
@@ -165,10 +209,14 @@ class Shot(Value):
             "singular_values": singular,
             "conjugate_target": ratio < _CONJUGATE,
             "conjugate_times": tuple(t * plan.duration for t in conjugate),
-            "optimality": _optimality(starts, agreeing, ratio, conjugate),
+            "optimality": _optimality(starts, agreeing, ratio, conjugate)
+            if self.free is None
+            else _optimality_over_a_set(conjugate),
             "discretisation": "none: the extremal is exact to rounding",
             "extremal": extremal,
         }
+        if self.free is not None:
+            details["transversality"] = float(np.linalg.norm(self.free @ extremal.costates[-1])) / plan.duration
         end = flown_end(plan.group, plan.u, plan.duration)
         error = distance(plan.group, plan.target, end)
         seconds = {**self.seconds, "examine": examined - started, "simulate": time.perf_counter() - examined}
@@ -195,6 +243,18 @@ def _optimality(starts: int, agreeing: int, ratio: float, conjugate: tuple[float
     return (
         f"{first}; the cheapest extremal of {starts} starts, {agreeing} of which ended within 1 % of its cost; that nothing "
         "is cheaper is likely, not proved"
+    )
+
+
+def _optimality_over_a_set(focal: tuple[float, ...]) -> str:
+    if focal:
+        return (
+            f"an extremal that meets the set transversally, with a focal point at {focal[0]:.3f} of its duration: not a local "
+            "minimum over the set; try more starts"
+        )
+    return (
+        "an extremal that meets the set transversally (see `transversality`), no focal point before its end; the cheapest from "
+        f"{1 + _ELSEWHERE} elements of the set; that nothing is cheaper is likely, not proved"
     )
 
 

@@ -58,6 +58,13 @@ class Task:
             return self.target
         return np.asarray(self.target @ expm(self.group.hat(h @ self.free)))
 
+    def elements(self, more: int) -> tuple[Array, ...]:
+        """The target, and some other elements of a set of goals: what none would come to from the target, for what lies between."""
+        if not self.freedom:
+            return (self.target,)
+        rng = np.random.default_rng(0)
+        return (self.target, *(self.moved(h) for h in rng.uniform(-np.pi, np.pi, (more, self.freedom))))
+
 
 def check_duration(duration: object, where: str) -> None:
     """A duration in seconds whose square, and that of controls of about 1 / duration, stay in the range of a double.

@@ -67,6 +67,40 @@ def test_torques_turn_a_boresight_and_the_body_that_starts_elsewhere() -> None:
         assert lc.steer(SO3, plan.target @ roll, ("w1", "w2", "w3"), 3.0, start=start, **options).cost > plan.cost
 
 
+@pytest.mark.parametrize(
+    ("group", "goal", "controls", "cost"),
+    [
+        # the first is an arc of a great circle; the others were found twice, by programs that share no code
+        ("so3", lc.Pointing((0, 0, 1), (0.48, -0.6, 0.64)), ("w1", "w2"), np.arccos(0.64) ** 2),
+        ("so3", lc.Pointing((1, 0, 0), (0.48, -0.6, 0.64)), ("w1", "w2"), 2.473659),
+        ("se2", lc.Position((0, 1)), ("omega", "vx"), 5.161601),
+        ("se2", lc.Position((-1, 0.5)), ("omega", "vx"), 1.880744),
+        ("se2", lc.Position((0.5, 2)), ("omega", "vx"), 9.288260),
+    ],
+)
+def test_extremals_meet_sets_transversally(group: str, goal: object, controls: tuple[str, ...], cost: float) -> None:
+    plan = lc.steer(group, goal, controls, 1.0, method="optimal")
+    assert plan.cost == pytest.approx(cost, abs=1e-6)
+    assert plan.status.name == "LOCAL"
+    assert plan.details["transversality"] < 1e-9
+    X = flown(plan)[-1]
+    if isinstance(goal, lc.Pointing):
+        np.testing.assert_allclose(X @ goal.axis, goal.direction, atol=1e-7)
+    else:
+        np.testing.assert_allclose(X[:-1, -1], goal.point, atol=1e-7)
+
+
+def test_a_way_beyond_the_antipode_has_a_focal_point_at_it() -> None:
+    from lie_codegen.steering.shooting.transversal import focal_times
+
+    angle = 4.0  # X e3 runs along a great circle, past -e3
+    extremal = lc.shooter("so3", ("w1", "w2")).extremal(np.array([angle, 0, 0]))
+    (time,) = focal_times(extremal, np.array([[0.0, 0, 1]]))
+    assert time == pytest.approx(1 - np.pi / angle, abs=0.02)
+    short = lc.shooter("so3", ("w1", "w2")).extremal(np.array([3.0, 0, 0]))
+    assert focal_times(short, np.array([[0.0, 0, 1]])) == ()
+
+
 def test_goals_become_cosets() -> None:
     from lie_codegen.steering.goals import cosets, end_of
 

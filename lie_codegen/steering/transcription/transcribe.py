@@ -138,7 +138,7 @@ def _run(
         began = time.perf_counter()
         built = program(shape, name, listening=progress is not None)
         building += time.perf_counter() - began
-        for element in _elements(task):
+        for element in task.elements(_ELSEWHERE):
             there = replace(task, target=element)
             bench = Workbench(there, shape, numbers, built, progress or (lambda line: None))
             candidates += _candidates(bench, asked)
@@ -166,15 +166,6 @@ def _solvers(task: Task, structure: Structure, asked: Options) -> tuple[str, ...
     if asked.periodic or not task.report.controllable or not endable(structure):
         return ("ipopt",)
     return ("fatrop", "ipopt")
-
-
-def _elements(task: Task) -> tuple[Array, ...]:
-    """Elements of the goal to begin from: the one given, and some along its free directions, as turns that none would come to
-    from the others for obstacles in between."""
-    if not task.freedom:
-        return (task.target,)
-    rng = np.random.default_rng(0)
-    return (task.target, *(task.moved(h) for h in rng.uniform(-np.pi, np.pi, (_ELSEWHERE, task.freedom))))
 
 
 def _candidates(bench: Workbench, asked: Options) -> list[Candidate]:
