@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, Never, overload
+from typing import Any, Literal, Never, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from lie_codegen.control.loop_adaptive import adaptive, by_gauss, loop_events, l
 from lie_codegen.control.loop_arguments import LoopArguments, loop_arguments
 from lie_codegen.control.loop_error import loop_error
 from lie_codegen.control.loop_library import loop_library, loop_numbers, several
+from lie_codegen.control.loop_origin import LoopMaking, LoopOrigin, loop_origin, narrower, run_in_steps
 from lie_codegen.control.loop_package import loop_parts
 from lie_codegen.control.loop_run import Run, noise_stream, refined
 from lie_codegen.control.loop_states import initial_own, own_states
@@ -50,6 +51,7 @@ class ClosedLoop(Saved):
         states: the law's and the observer's own states by name, (k, ...) or (k, N, ...): as the law used them at that time.
         group: the group, or None for a mechanism that is not on one.
         events: what was found of each event, in their order.
+        origin: the definitions and numbers that it was run from; None for a law written by hand, which has none.
     """
 
     t: Array
@@ -64,6 +66,7 @@ class ClosedLoop(Saved):
     states: dict[str, Array] = field(default_factory=dict)
     group: Any = None
     events: tuple[EventHits, ...] = ()
+    origin: LoopOrigin | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def error(self) -> Array:
@@ -78,12 +81,14 @@ class ClosedLoop(Saved):
         """(X, xi) at other times of a single loop, (d, d) and (n,), or (k, d, d) and (k, n): by fresh steps, as exact as the run.
 
         Raises:
-            InputError: a time outside the run; several loops; a run by equal steps; one that was loaded or unpickled.
+            InputError: a time outside the run; several loops; a run by equal steps; one from a file whose law was written by
+                hand and has no definition.
         """
-        made: LoopMaking | None = vars(self).get("_making")
+        made = self._making
         if made is None or made.pair is None or made.run.many:
             raise InputError(
-                "ClosedLoop.at: only of a single loop that closed_loop(rtol=...) ran here, on a group; run it again"
+                "ClosedLoop.at: only of a single loop that closed_loop(rtol=...) ran, on a group; from a file only with a law that "
+                "has a definition: run it again"
             )
         moments = np.asarray(t, dtype=float)
         wanted = np.atleast_1d(moments)
@@ -98,29 +103,27 @@ class ClosedLoop(Saved):
         """The law as C with <name>_loop.c, which runs the first loop without noise, as `lc.generate(run, folder)` writes them.
 
         Raises:
-            InputError: the loop has no law, or was loaded or unpickled: a file keeps the motion, not what made it.
+            InputError: the loop has no law; or it is from a file, and its law was written by hand and has no definition.
         """
-        made: LoopMaking | None = vars(self).get("_making")
+        made = self._making
         if made is None:
-            raise InputError("generate: a loop that was loaded does not know its law any more; run closed_loop again")
-        run, parts = made.run, made.parts
-        if not parts:  # steps of any length are nothing to take home: the equal ones that are as good
-            run = run_in_steps(run, made.told)
-            parts = refined(run, made.told.rtol, _narrower)[1]
-        return loop_parts(run, made.told.reference, parts, name, real)
+            raise InputError(
+                "generate: a loop that was loaded knows its law only by a definition, and this one has none; run closed_loop again"
+            )
+        run, parts = made.in_steps()
+        return loop_parts(run, made.reference, parts, name, real)
+
+    @property
+    def _making(self) -> LoopMaking | None:
+        """What ran it: kept beside the fields in its own process, elsewhere made again."""
+        made: LoopMaking | None = vars(self).get("_made")
+        if made is None and self.origin is not None:
+            made = self._made_by(self.origin.again(self.t))._making
+        return made
 
     def _made_by(self, making: LoopMaking) -> ClosedLoop:
-        object.__setattr__(self, "_making", making)  # beside the fields: neither == nor a pickle sees it
+        object.__setattr__(self, "_made", making)  # beside the fields: neither == nor a pickle sees it
         return self
-
-
-class LoopMaking(NamedTuple):
-    """What ran a loop; no parts where its steps were of any length."""
-
-    run: Run
-    told: LoopArguments
-    parts: int
-    pair: PairRun | None = None
 
 
 @overload
@@ -327,7 +330,8 @@ def closed_loop(
             )
         if events:
             raise InputError("closed_loop: events go with rtol, not with method='gauss'")
-        return _result(run_in_steps(run, told), told, by_gauss(run, told.parts), told.parts, float("nan"))
+        equal = run_in_steps(run, told.model, told.reference)
+        return _result(equal, told, by_gauss(run, told.parts), told.parts, float("nan"))
     if events and (told.step is not None or "loop_rate" not in library.kernels or not loop_system(run).compiled):
         raise InputError(
             "closed_loop: events are of a law that acts continuously on a group, with rtol; not with step or sample"
@@ -339,14 +343,9 @@ def closed_loop(
             found, pair = adaptive(run, told.rtol)
             hits = loop_events(run, pair, events) if events else ()
             return _result(run, told, found, 0, pair.error_estimate, pair, hits)
-        run = run_in_steps(run, told)
-    found, count, error = refined(run, told.rtol, _narrower)
+        run = run_in_steps(run, told.model, told.reference)
+    found, count, error = refined(run, told.rtol, narrower)
     return _result(run, told, found, count, error)
-
-
-def run_in_steps(run: Run, told: LoopArguments) -> Run:
-    """The same loop by equal steps: without a compiler, and as C to take home."""
-    return replace(run, library=loop_library(told.model, told.reference, "continuous")[1])
 
 
 def _whole(value: Any, name: str, default: int) -> int:
@@ -355,16 +354,6 @@ def _whole(value: Any, name: str, default: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
         raise InputError(f"closed_loop: {name} is a whole number, not negative; given {shown(value)}")
     return int(value)
-
-
-def _narrower(run: Run, loops: Array) -> Run:
-    """Some of the loops alone; their noise is other numbers, as large."""
-    ranks = {port.name: len(port.shape) for port in run.loop.number_ports(noisy=True)}
-    numbers = {
-        name: np.ascontiguousarray(value[loops]) if value.ndim > ranks[name] else value
-        for name, value in run.numbers.items()
-    }
-    return replace(run, start=np.ascontiguousarray(run.start[loops]), numbers=numbers)
 
 
 def _result(
@@ -388,20 +377,11 @@ def _result(
     steps = pair.steps if pair is not None else count * round((times[-1] - times[0]) / gap)
     group = getattr(loop.plant, "group", None)
     shared = {name: value for name, value in states.items() if name not in outputs}
+    making = LoopMaking(run, told.model, told.reference, told.rtol, count, pair)
     return ClosedLoop(
-        times,
-        X,
-        xi,
-        {**outputs, **shared},
-        moves.get("X_d"),
-        moves.get("xi_d"),
-        steps,
-        error,
-        u,
-        states,
-        group,
-        events,
-    )._made_by(LoopMaking(run, told, count, pair))
+        times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group, events,
+        loop_origin(making, told.kind if pair is None else "adaptive"),
+    )._made_by(making)  # fmt: skip
 
 
 def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:

@@ -197,7 +197,7 @@ def _record(record: dict[str, Any], arrays: Mapping[str, Array], path: str) -> A
     if "mapping" in record:
         return {key: _decoded(each, arrays, path) for key, each in record["mapping"]}
     if "definition" in record:
-        _check_kinds(record["definition"], path)
+        check_kinds(record["definition"], path)
         return made_from(record["definition"])
     if "formula" in record:
         return _read_formula(record)
@@ -225,7 +225,7 @@ def _class_of(name: str, path: str, *, enum: bool) -> Any:
     return found
 
 
-def _check_kinds(definition: Any, path: str) -> None:
+def check_kinds(definition: Any, path: str) -> None:
     """Every factory that a definition names is one of this package."""
     if isinstance(definition, Mapping):
         kind = definition.get("kind")
@@ -234,7 +234,7 @@ def _check_kinds(definition: Any, path: str) -> None:
         if named and not str(kind).startswith("lie_codegen."):
             raise InputError(f"{path} names {kind!r}, which is no value of this package")
         for each in definition.values():
-            _check_kinds(each, path)
+            check_kinds(each, path)
     elif isinstance(definition, list | tuple):
         for each in definition:
-            _check_kinds(each, path)
+            check_kinds(each, path)
