@@ -1089,11 +1089,11 @@ static void refuse(steering_result *result)
 {
     int i, c;
     memset(result, 0, sizeof *result);
-    result->cost = result->residual = NAN;
+    result->cost = result->residual = (double)NAN;
     for (i = 0; i < N; ++i) {
-        result->mu0[i] = NAN;
+        result->mu0[i] = (double)NAN;
         for (c = 0; c < N; ++c) {
-            result->jacobian[i][c] = NAN;
+            result->jacobian[i][c] = (double)NAN;
         }
     }
     result->status = STEERING_INPUT;

@@ -115,6 +115,16 @@ def c_float_literal(value: float) -> str:
     return f"({text}f)" if text.startswith("-") else f"{text}f"
 
 
+_CALLED = re.compile(r"\b(" + "|".join(sorted(_FUNCTIONS | {"floor", "ldexp"})) + r")\(")
+_FLOATING = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
+
+
+def in_single(text: str) -> str:
+    """A C text in double, written in single precision: its type, the functions of math.h that it calls, its constants, NAN."""
+    text = _CALLED.sub(r"\1f(", re.sub(r"\bdouble\b", "float", text))
+    return _FLOATING.sub(r"\1f", text)
+
+
 @dataclass(frozen=True)
 class Target:
     """A C dialect a tape can be printed in: scalar doubles, or later lanes of them.

@@ -137,7 +137,7 @@ def _check(namespace: str, kernels: Sequence[Kernel]) -> None:
 
 def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata, target: Target) -> PackageView:
     _check(namespace, kernels)
-    tapes = [tape_of(kernel) for kernel in kernels]
+    tapes = [tape_of(kernel, target.type_name) for kernel in kernels]
     return package_view(namespace, kernels, tapes, metadata, target)
 
 

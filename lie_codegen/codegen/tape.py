@@ -44,15 +44,15 @@ class Tape:
     outputs: tuple[tuple[int, ...], ...]
 
 
-def tape_of(kernel: Kernel) -> Tape:
-    """The tape of a kernel.
+def tape_of(kernel: Kernel, real: str = "double") -> Tape:
+    """The tape of a kernel, for C in `real`.
 
     Raises:
         CodegenError: the kernel uses an operation that has no scalar meaning.
     """
     from lie_codegen.kernel.casadi_arithmetic import function_of
 
-    return tape_of_function(function_of(kernel))
+    return tape_of_function(function_of(kernel, real))
 
 
 def tape_of_function(function: Any) -> Tape:

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from lie_codegen.codegen.opcodes import C99, RESERVED, Target
+from lie_codegen.codegen.opcodes import C99, RESERVED, Target, in_single
 from lie_codegen.codegen.signature import is_step
 from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Statement, Tape, tape_of
@@ -62,7 +62,8 @@ class PortView:
 class StatementView:
     """const <type> <name> = <expression>;
 
-    A call of a routine leaves an array, of `results` doubles: <expression>(arguments, <name>), where `condition` holds if it has one.
+    A call of a routine leaves an array, of `results` numbers of `type_name`: <expression>(arguments, <name>), where `condition` holds if it
+    has one.
     """
 
     name: str
@@ -70,6 +71,7 @@ class StatementView:
     arguments: tuple[str, ...] = ()
     results: int = 0
     condition: str = ""
+    type_name: str = ""
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,7 @@ class RoutineView:
 
     helpers: tuple[KernelView, ...]
     text: str
+    type_name: str
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,7 @@ def package_view(
             _told_apart(kernel_view(kernel, tape, target, in_parts=True), names)
             for kernel, tape in zip(kernels, tapes, strict=True)
         ),
-        routines=_routine_views(routines_of(tapes)),
+        routines=_routine_views(routines_of(tapes), target),
     )
 
 
@@ -169,14 +172,24 @@ def routines_of(tapes: Iterable[Tape]) -> tuple[Routine, ...]:
     return tuple(dict.fromkeys(routine for routine in found if routine is not None))
 
 
-def _routine_views(routines: Iterable[Routine]) -> tuple[RoutineView, ...]:
-    """The C text of routines and of the kernels they call, each of these once, all in double."""
+def _routine_target(routine: Routine, target: Target) -> Target:
+    """Double, whatever the package computes in, unless the routine knows its settings in single precision."""
+    return C99 if routine.single is None else target
+
+
+def _routine_views(routines: Iterable[Routine], target: Target) -> tuple[RoutineView, ...]:
+    """The C text of routines and of the kernels they call, each of these once."""
     views, printed = [], set[str]()
     for routine in routines:
         fresh = [kernel for kernel in routine.helpers if kernel.symbol not in printed]
         printed.update(kernel.symbol for kernel in fresh)
-        helpers = tuple(kernel_view(kernel, tape_of(kernel), in_parts=True) for kernel in fresh)
-        views.append(RoutineView(helpers, render(routine.template, name=routine.name, **dict(routine.settings))))
+        own = _routine_target(routine, target)
+        helpers = tuple(kernel_view(kernel, tape_of(kernel, own.type_name), own, in_parts=True) for kernel in fresh)
+        settings = dict(routine.settings)
+        if own.type_name == "float":
+            settings |= dict(routine.single or ())
+        text = render(routine.template, name=routine.name, **settings)
+        views.append(RoutineView(helpers, in_single(text) if own.type_name == "float" else text, own.type_name))
     return tuple(views)
 
 
@@ -247,12 +260,13 @@ def _printed(
                     "a kernel that calls a routine has no form in this package: it is printed in packages of kernels alone"
                 )
             values.append(f"{prefix}{index}")
-            statements.append(_call(statement, values))
+            statements.append(_call(statement, values, target))
             continue
         elif statement.op == "RESULT":
-            # Routines are in double whatever the target is.
             number = f"{values[statement.operands[0]]}[{statement.slot[0]}]"
-            text = number if target.type_name == "double" else f"({target.type_name}){number}"
+            routine = tape.statements[statement.operands[0]].routine
+            own = target if routine is None else _routine_target(routine, target)
+            text = number if target.type_name == own.type_name else f"({target.type_name}){number}"
         else:
             text = target.expression(statement.op, tuple(values[i] for i in statement.operands))
         values.append(f"{prefix}{index}")
@@ -260,13 +274,17 @@ def _printed(
     return tuple(statements), values
 
 
-def _call(statement: Statement, values: Sequence[str]) -> StatementView:
+def _call(statement: Statement, values: Sequence[str], target: Target) -> StatementView:
     routine = statement.routine
     if routine is None:
         raise CodegenError("a call without a routine")
     condition, *arguments = (values[i] for i in statement.operands)
     always = condition.rstrip("f") == C99.literal(1.0)
-    return StatementView(values[-1], routine.name, tuple(arguments), routine.outputs, "" if always else condition)
+    type_name = _routine_target(routine, target).type_name
+    if type_name != target.type_name:
+        arguments = [f"({type_name}){argument}" for argument in arguments]
+    condition = "" if always else condition
+    return StatementView(values[-1], routine.name, tuple(arguments), routine.outputs, condition, type_name)
 
 
 def _unread(inputs: Sequence[PortView], tape: Tape) -> tuple[str, ...]:

@@ -61,6 +61,15 @@ class Arithmetic(Protocol):
         """
 
 
+#: Unit roundoff of the numbers a kernel is printed for.
+ROUNDOFF = {"double": 2.0**-53, "float": 2.0**-24}
+
+
+def unit_roundoff(ops: Arithmetic) -> float:
+    """Half the distance from 1 to the next number: double's, unless the arithmetic says that it writes for another."""
+    return float(getattr(ops, "unit_roundoff", ROUNDOFF["double"]))
+
+
 class FloatArithmetic:
     """Python floats: the plain meaning of a kernel, without any library."""
 

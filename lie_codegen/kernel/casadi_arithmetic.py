@@ -10,14 +10,17 @@ import casadi as ca
 import numpy as np
 
 from lie_codegen.errors import ShapeError
-from lie_codegen.kernel.arithmetic import FloatArithmetic
+from lie_codegen.kernel.arithmetic import ROUNDOFF, FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import Routine
 
 
 class CasadiArithmetic:
-    """SX scalars; exact constants become the nearest doubles."""
+    """SX scalars; exact constants become the nearest doubles. `real` is the type of the C that the graph is for."""
+
+    def __init__(self, real: str = "double") -> None:
+        self.unit_roundoff = ROUNDOFF[real]
 
     def constant(self, value: Any) -> float:
         return float(value)
@@ -119,15 +122,15 @@ def routine_number(number: float) -> Routine:
     return next(routine for routine, each in _NUMBERS.items() if each == number)
 
 
-def function_of(kernel: Kernel) -> ca.Function:
+def function_of(kernel: Kernel, real: str = "double") -> ca.Function:
     """The kernel as a CasADi Function of dense column vectors.
 
     Each port becomes one column vector of `port.size` entries in C order: row-major, complex entries as
-    interleaved (re, im). No transposition is left to do in C or in numpy.
+    interleaved (re, im). No transposition is left to do in C or in numpy. `real`: the type of the C that it becomes.
     """
     symbols = [ca.SX.sym(port.name, port.size) for port in kernel.inputs]
     arguments = [_unflatten(port, ca.vertsplit(symbol)) for port, symbol in zip(kernel.inputs, symbols, strict=True)]
-    results = kernel.evaluate(CasadiArithmetic(), *arguments)
+    results = kernel.evaluate(CasadiArithmetic(real), *arguments)
     flat = [
         ca.densify(ca.vertcat(*[ca.SX(entry) for entry in flatten(port, value)]))
         for port, value in zip(kernel.outputs, results, strict=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar, unit_roundoff
 from lie_codegen.kernel.routine import call_routine
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
@@ -101,6 +101,7 @@ class DualArithmetic:
     def __init__(self, ops: Arithmetic) -> None:
         self.ops = ops
         self.level: int = getattr(ops, "level", 0) + 1
+        self.unit_roundoff = unit_roundoff(ops)
 
     def variable(self, value: Scalar, tangent: Mapping[int, Scalar]) -> Dual:
         """value + sum tangent[i] e_i, structural zeros dropped."""

@@ -39,6 +39,7 @@ class Routine:
         helpers: kernels that its C text calls, printed before it as static functions.
         evaluate: its twin.
         tangent: its derivative, in any arithmetic, from inputs and outputs.
+        single: settings that are others in single precision; None: the routine computes in double whatever the package does.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Routine:
     helpers: tuple[Kernel, ...] = field(compare=False)
     evaluate: Callable[[Sequence[float]], Sequence[float] | Array] = field(compare=False)
     tangent: Tangent = field(compare=False)
+    single: tuple[tuple[str, Any], ...] | None = None
 
     def __post_init__(self) -> None:
         check_identifier(self.name, "routine name")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg
 import toy_kernels
 from operation_kernels import every_operation
 
@@ -62,6 +65,39 @@ def test_the_example_passes_on_an_emulated_processor(package: Path) -> None:
     source = f"src/{package.name}.c"
     run(ARM, "-static", "-O2", "-Iinclude", "example.c", source, "-lm", "-o", "example_arm", folder=package)
     assert "WRONG" not in run(EMULATOR, "./example_arm", folder=package)
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["so3", "se3", "su2", "so4", "su3", "sl2", "sim3"])
+def test_the_logarithm_computes_in_single_precision(name: str, tmp_path: Path) -> None:
+    """exp(-hat log X) X is 1 to single precision, of elements rounded to floats; in C without one double."""
+    group = lc.group(name)
+    folder = lc.generate(group, tmp_path / "p", real="float")
+    assert not re.search(r"\bdouble\b", (folder / "src" / f"{name}.c").read_text())
+    run(
+        COMPILERS[-1],
+        *STRICT,
+        "-O1",
+        "-Iinclude",
+        "-shared",
+        "-fPIC",
+        f"src/{name}.c",
+        "-lm",
+        "-o",
+        "lib.so",
+        folder=folder,
+    )
+    log = getattr(ctypes.CDLL(str(folder / "lib.so")), f"{name}_log")
+    rng = np.random.default_rng(7)
+    real = np.complex64 if np.iscomplexobj(group.basis) else np.float32
+    for size in np.repeat([1e-3, 0.3, 1.0, 2.0], 50):
+        X = scipy.linalg.expm(group.hat(size * rng.normal(size=group.dim)))
+        rounded = np.ascontiguousarray(X.astype(real))
+        x = np.zeros(group.dim, dtype=np.float32)
+        log(rounded.ctypes.data_as(ctypes.c_void_p), x.ctypes.data_as(ctypes.c_void_p))
+        kappa = np.linalg.norm(X) * np.linalg.norm(np.linalg.inv(X))
+        left = scipy.linalg.expm(-group.hat(x.astype(float))) @ X
+        assert np.linalg.norm(left - np.eye(len(X))) < 2e-6 * kappa
 
 
 @needs_compiler

@@ -125,7 +125,7 @@ def test_a_group_two_laws_and_a_plan_in_one_package(tmp_path: Path) -> None:
     assert "CMAKE_BUILD_TYPE:STRING=Release" in (build / "CMakeCache.txt").read_text()
     subprocess.run(["cmake", "--build", build], check=True, capture_output=True)
     done = subprocess.run(["ctest", "--test-dir", build], check=True, capture_output=True, text=True)
-    assert "2 tests" in done.stdout or "tests passed, 0 tests failed out of 2" in done.stdout
+    assert "out of 2" in done.stdout
     debug = tmp_path / "debug"
     subprocess.run(["cmake", "-S", folder, "-B", debug, "-DCMAKE_BUILD_TYPE=Debug"], check=True, capture_output=True)
     assert "CMAKE_BUILD_TYPE:STRING=Debug" in (debug / "CMakeCache.txt").read_text()

@@ -35,7 +35,7 @@ from lie_codegen.groups.maps.log_structure import LogBlock
 from lie_codegen.groups.maps.logarithm import candidate
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
 from lie_codegen.groups.maps.rkmk import hat_body
-from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernel.arithmetic import ROUNDOFF, Arithmetic, FloatArithmetic, Scalar, unit_roundoff
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matmul, matvec, total
@@ -43,11 +43,48 @@ from lie_codegen.kernel.routine import Routine, call_routine
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.on_demand import scipy
 
-#: The defect up to which a closed form is taken as it is: rounding.
-_ROUNDING = 1e-13
+#: The defect up to which a closed form is taken as it is: rounding of the numbers that the kernel is printed for.
+_ROUNDING = {ROUNDOFF["double"]: 1e-13, ROUNDOFF["float"]: 4e-6}
 _STEPS = 3
 _RESIDUAL, _DISTANCE = 1e-12, 1e-5
 _SETTLED = 4e-15
+#: What counts as zero on the way, in double and in single precision: `off`, `pivot`, `symmetric`, `kernel` bound squares.
+_DOUBLE = {
+    "off": "1e-30",
+    "pivot": "1e-36",
+    "symmetric": "1e-32",
+    "nudge": "1e-16",
+    "polar": "1e-15",
+    "deflation": "1.1e-16",
+    "singular": "1e-13",
+    "settled": repr(_SETTLED),
+    "residual": repr(_RESIDUAL),
+    "kernel": "1e-14",
+    "cluster": "1e-6",
+    "tie": "1e-9",
+    "short": "1e-7",
+    "independent": "1e-6",
+    "turn": "1e-5",
+    "cost": "1e-6",
+}
+_SINGLE = {
+    "off": "1e-13",
+    "pivot": "1e-18",
+    "symmetric": "1e-14",
+    "nudge": "1e-7",
+    "polar": "5e-7",
+    "deflation": "6e-8",
+    "singular": "1e-5",
+    "settled": "1e-6",
+    "residual": "2e-5",
+    "kernel": "1e-5",
+    "cluster": "3e-4",
+    "tie": "1e-4",
+    "short": "1e-3",
+    "independent": "3e-4",
+    "turn": "1e-3",
+    "cost": "1e-4",
+}
 
 
 def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector:
@@ -57,12 +94,13 @@ def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence
     if not data.log_structure.is_closed:
         return call_routine(ops, log_routine(data), flat)
     x = _whole(ops, data, candidate(ops, data, entries))
+    rounding = _ROUNDING[unit_roundoff(ops)]
     # Not `less(rounding, defect)`, which is false for NaN.
     square = off_group_square(ops, data, entries)
     if square is None:
-        on_group = ops.less(defect(ops, data, entries), ops.constant(_ROUNDING))
+        on_group = ops.less(defect(ops, data, entries), ops.constant(rounding))
     else:
-        on_group = ops.less(square, ops.constant(_ROUNDING**2))
+        on_group = ops.less(square, ops.constant(rounding**2))
     off_group = ops.less(ops.where(on_group, ops.constant(1), 0), ops.constant(0.5))
     checked = call_routine(ops, log_routine(data), flat, off_group)
     return [ops.where(on_group, closed, value) for closed, value in zip(x, checked, strict=True)]
@@ -134,6 +172,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         ("blocks", _Frozen(blocks)),
         ("logs_size", size),
         ("distance", distance),
+        ("rounding", _Settings(_DOUBLE)),
         ("constants", tuple((i, j, k, float(c)) for i, j, k, c in group.algebra.constants())),
         ("candidate_symbol", first.symbol),
         ("error_symbol", second.symbol),
@@ -150,6 +189,8 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         tuple(helpers),
         twin,
         _tangent(data),
+        # Rounding X to floats moves it off the group by a few 1e-7.
+        (("rounding", _Settings(_SINGLE)), ("distance", max(distance, 2e-5))),
     )
 
 
@@ -187,6 +228,13 @@ class _Frozen(tuple[Any, ...]):
 
     def __hash__(self) -> int:
         return hash(repr(tuple(self)))
+
+
+class _Settings(dict[str, str]):
+    """Named constants that can be a part of a key."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(self.items()))
 
 
 def vee(ops: Arithmetic, data: GroupDerivation, A: Sequence[Sequence[Any]]) -> Vector:
