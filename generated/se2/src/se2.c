@@ -311,9 +311,9 @@ static int se2_log_checked_newton(const double *x, const double *u, double *y)
         }
         for (i = 0; i < 3; ++i) {
             for (j = 0; j < 3; ++j) {
-                P[i][j] = R[i][j] / step;
+                P[i][j] = R[i][j] / (double)step;
                 E[i][j] += P[i][j];
-                F[i][j] += P[i][j] / (step + 1);
+                F[i][j] += P[i][j] / (double)(step + 1);
             }
         }
     }
@@ -408,7 +408,7 @@ static void se2_log_checked(const double *X, double *x)
         }
     } while (0);
     for (k = 0; k < 3; ++k) {
-        x[k] = NAN;
+        x[k] = (double)NAN;
     }
 }
 
@@ -582,7 +582,7 @@ void se2_log(const double X[9], double x[3])
     const double t36 = atan2(t33, t35);
     const double t37 = t30 != 0.0 ? 1.0 : 0.0;
     const double t39 = (double)(t37 < 0.5);
-    double t40[3] = {0.0};
+    double t40[3] = {0};
     if (t39 != 0) {
         se2_log_checked((const double[9]){t0, t1, t2, t3, t4, t5, t6, t7, t8}, t40);
     }

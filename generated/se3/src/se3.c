@@ -618,9 +618,9 @@ static int se3_log_checked_newton(const double *x, const double *u, double *y)
         }
         for (i = 0; i < 6; ++i) {
             for (j = 0; j < 6; ++j) {
-                P[i][j] = R[i][j] / step;
+                P[i][j] = R[i][j] / (double)step;
                 E[i][j] += P[i][j];
-                F[i][j] += P[i][j] / (step + 1);
+                F[i][j] += P[i][j] / (double)(step + 1);
             }
         }
     }
@@ -715,7 +715,7 @@ static void se3_log_checked(const double *X, double *x)
         }
     } while (0);
     for (k = 0; k < 6; ++k) {
-        x[k] = NAN;
+        x[k] = (double)NAN;
     }
 }
 
@@ -1183,7 +1183,7 @@ void se3_log(const double X[16], double x[6])
     const double t166 = t165 * t100;
     const double t167 = t68 != 0.0 ? 1.0 : 0.0;
     const double t169 = (double)(t167 < 0.5);
-    double t170[6] = {0.0};
+    double t170[6] = {0};
     if (t169 != 0) {
         se3_log_checked((const double[16]){t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15}, t170);
     }

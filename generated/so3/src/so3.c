@@ -387,9 +387,9 @@ static int so3_log_checked_newton(const double *x, const double *u, double *y)
         }
         for (i = 0; i < 3; ++i) {
             for (j = 0; j < 3; ++j) {
-                P[i][j] = R[i][j] / step;
+                P[i][j] = R[i][j] / (double)step;
                 E[i][j] += P[i][j];
-                F[i][j] += P[i][j] / (step + 1);
+                F[i][j] += P[i][j] / (double)(step + 1);
             }
         }
     }
@@ -484,7 +484,7 @@ static void so3_log_checked(const double *X, double *x)
         }
     } while (0);
     for (k = 0; k < 3; ++k) {
-        x[k] = NAN;
+        x[k] = (double)NAN;
     }
 }
 
@@ -809,7 +809,7 @@ void so3_log(const double X[9], double x[3])
     const double t150 = t149 * t84;
     const double t151 = t51 != 0.0 ? 1.0 : 0.0;
     const double t153 = (double)(t151 < 0.5);
-    double t154[3] = {0.0};
+    double t154[3] = {0};
     if (t153 != 0) {
         so3_log_checked((const double[9]){t0, t1, t2, t3, t4, t5, t6, t7, t8}, t154);
     }
