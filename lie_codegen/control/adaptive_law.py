@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.control.claims import check_claims
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.error_catalogue import as_error, gain
+from lie_codegen.control.error_catalogue import gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
+from lie_codegen.control.error_inputs import input_parameters
 from lie_codegen.control.physical_inertia import kept_physical
 from lie_codegen.control.reference_kernels import ReferenceBody
 from lie_codegen.control.reference_motion import Reference
@@ -38,6 +39,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, constant_matrix, dot, matvec, minus, negative, plus, scaled
+from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, sample_inputs, values_of
 from lie_codegen.on_demand import sympy as sp
 
 
@@ -109,7 +111,8 @@ def adaptive_law(
 
     Args:
         group, error, gains, feedforward: as `tracking_law`; gains hold K_d and what the error function needs.
-        rate: Gamma, positive: a number, a diagonal or an (m, m) matrix.
+        rate: Gamma, positive: a number, a diagonal or an (m, m) matrix. It and every gain may be "input": an input of that name, behind
+            the others.
         start: (m,) first guess of a; of the identity if not given.
         basis: (m) symmetric (n, n) matrices B_k, I = sum a_k B_k; if not given all symmetric ones: the diagonal, then the entries above it
             row by row, on SO(3) (xx, yy, zz, xy, xz, yz).
@@ -123,22 +126,36 @@ def adaptive_law(
     group = as_group(group, "adaptive_law")
     if feedforward not in FEEDFORWARDS:
         raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
-    pair, n = as_error(group, error, gains), group.dim
-    K_d = positive_matrix(gain(gains, "K_d", "an adaptive law"), n, "K_d")
+    refuse_input(start, "adaptive_law: start", "it is where the state a starts; a closed loop takes another as start")
+    refuse_input(basis, "adaptive_law: basis", "the number of parameters and the feedforward's columns follow from it")
+    pair, n = law_error(group, error, gains), group.dim
     check_compatibility(pair)
     check_claims(pair)
     matrices = _basis(basis, n)
     m = len(matrices)
-    Gamma = positive_matrix(rate, m, "rate")
+    parameters = (
+        parameter(
+            Port("K_d", (n, n), description="dissipation, symmetric"),
+            gain(gains, "K_d", "an adaptive law"),
+            lambda value, what: positive_matrix(value, n, what),
+        ),
+        parameter(
+            Port("rate", (m, m), description="Gamma of the adaptation, symmetric"),
+            rate,
+            lambda value, what: positive_matrix(value, m, what),
+        ),
+        *input_parameters(pair),
+    )
     a0 = _start(start, matrices, n)
     real = RealMatrices(group)
     physical = project and group.dim == 3 and group.degree == 3
 
     def body(
-        ops: Arithmetic, X: Any, xi: Vector, X_d: Any, xi_d: Vector, xi_d_dot: Vector, a: Vector
+        ops: Arithmetic, X: Any, xi: Vector, X_d: Any, xi_d: Vector, xi_d_dot: Vector, a: Vector, *given: Any
     ) -> tuple[Any, ...]:
+        K_d, Gamma, *rest = values_of(ops, parameters, given)
         read = GroupMatrices(ops, real).read
-        at = ErrorDerivatives(ops, pair, real, read(X), read(X_d))
+        at = ErrorDerivatives(ops, pair, real, read(X), read(X_d), rest)
         phi, slope = at.differential(1)
         nu, nu_dot, turned = at.transported_rates(xi, xi_d, xi_d_dot)
         xi_e = minus(xi, nu)
@@ -146,8 +163,8 @@ def adaptive_law(
             feedforward_force(ops, real, constant_matrix(ops, B), feedforward, xi, nu, nu_dot, turned) for B in matrices
         ]
         forward = plus(*[scaled(x, column) for x, column in zip(a, columns, strict=True)])
-        force = plus(negative(slope), negative(matvec(constant_matrix(ops, K_d), xi_e)), forward)
-        drift = negative(matvec(constant_matrix(ops, Gamma), [dot(column, xi_e) for column in columns]))
+        force = plus(negative(slope), negative(matvec(K_d, xi_e)), forward)
+        drift = negative(matvec(Gamma, [dot(column, xi_e) for column in columns]))
         if physical:
             drift = kept_physical(ops, matrices, Gamma, a, drift, a0)
         return force, drift, phi
@@ -157,7 +174,7 @@ def adaptive_law(
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         vectors = [[rng.uniform(-1, 1) for _ in range(n)] for _ in range(3)]
         X, X_d = random_element(group, data, rng), random_element(group, data, rng)
-        return X, vectors[0], X_d, vectors[1], vectors[2], [float(x) for x in a0]
+        return X, vectors[0], X_d, vectors[1], vectors[2], [float(x) for x in a0], *sample_inputs(parameters, rng)
 
     speed = velocity_units(group)
     made = AdaptiveLaw(
@@ -170,6 +187,7 @@ def adaptive_law(
             Port("xi_d", (n,), speed, description="reference velocity"),
             Port("xi_d_dot", (n,), velocity_units(group, "s^2"), description="its rate of change"),
             Port("a", (m,), description="parameters of the inertia, a state of the law"),
+            *input_ports(parameters),
         ),
         outputs=(
             Port("force", (n,), force_units(group), description="body force"),

@@ -25,7 +25,6 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
     Matrix,
     Vector,
-    constant_matrix,
     cross,
     dot,
     matmul,
@@ -301,7 +300,7 @@ _ANTIPODE = 1e-14
 def attitude_lyapunov(
     *, inertia: Any, k_p: Any, k_d: Any, epsilon: Any, gyroscopic: str = "none", name: str = "attitude_lyapunov"
 ) -> Kernel:
-    """The strict Lyapunov function of Proposition 21 and its rate: (X, omega) -> (V, V_dot).
+    """The strict Lyapunov function of Proposition 21 and its rate: (X, omega) -> (V, V_dot); each number may be "input".
 
         V = k_p |theta|^2/2 + omega' I omega/2 + epsilon theta' I omega
 
@@ -311,11 +310,16 @@ def attitude_lyapunov(
     Raises:
         InputError: as `attitude_law`.
     """
-    metric = body_inertia(inertia)
-    p, d, e = (positive_number(v, w) for v, w in ((k_p, "k_p"), (k_d, "k_d"), (epsilon, "epsilon")))
+    parameters = (
+        _inertia(inertia, False),
+        parameter(Port("k_p", (), "N m/rad"), k_p, positive_number),
+        parameter(Port("k_d", (), "N m s/rad"), k_d, positive_number),
+        parameter(Port("epsilon", (), "1/s", description="of the cross term"), epsilon, positive_number),
+    )
     c = gyroscopic_factor(gyroscopic) - 1
 
-    def body(ops: Arithmetic, X: Matrix, omega: Vector) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, X: Matrix, omega: Vector, *given: Any) -> tuple[Any, ...]:
+        metric, p, d, e = values_of(ops, parameters, given)
         dual = DualArithmetic(ops)
         wx = [[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]]
         rate = matmul(X, wx)
@@ -323,23 +327,22 @@ def attitude_lyapunov(
         logarithm = rotation_log(dual, moving)
         theta = [value_of(entry, dual.level) for entry in logarithm]
         theta_dot = [tangent_of(entry, 0, dual.level) for entry in logarithm]
-        momentum = matvec(constant_matrix(ops, metric), omega)
-        action = plus(scaled(number(ops, p), theta), scaled(number(ops, d), omega))
+        momentum = matvec(metric, omega)
+        action = plus(scaled(p, theta), scaled(d, omega))
         force = minus(scaled(c, cross(omega, momentum)), action)
-        kp, ke = number(ops, p), number(ops, e)
-        V = (kp * dot(theta, theta) + dot(omega, momentum)) / 2 + ke * dot(theta, momentum)
+        V = (p * dot(theta, theta) + dot(omega, momentum)) / 2 + e * dot(theta, momentum)
         crossing = dot(theta_dot, momentum) + dot(theta, force)
-        return V, -number(ops, d) * dot(omega, omega) + ke * crossing
+        return V, -d * dot(omega, omega) + e * crossing
 
     return Kernel(
         name=name,
         namespace="so3",
-        inputs=(_ATTITUDE, _RATE),
+        inputs=(_ATTITUDE, _RATE, *input_ports(parameters)),
         outputs=(Port("V", (), "J"), Port("V_dot", (), "W")),
         body=body,
         formula="V = k_p |theta|^2/2 + omega' I omega/2 + epsilon theta' I omega, and dV/dt along the closed loop",
         source="Geyer, The Attitude Control Problem, proof of Proposition 21",
-        sampler=lambda rng: (_rotation(rng), [rng.uniform(-1, 1) for _ in range(3)]),
+        sampler=lambda rng: (_rotation(rng), [rng.uniform(-1, 1) for _ in range(3)], *sample_inputs(parameters, rng)),
     )
 
 

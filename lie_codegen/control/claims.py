@@ -9,6 +9,7 @@ import numpy as np
 from lie_codegen.control.critical_points import CriticalPoints, check_positive, found_points
 from lie_codegen.control.descent import place
 from lie_codegen.control.error_function import ErrorFunction
+from lie_codegen.control.error_inputs import at_numbers
 from lie_codegen.control.error_samples import error_samples
 from lie_codegen.errors import InputError
 
@@ -32,6 +33,7 @@ def check_claims(pair: ErrorFunction) -> None:
     if not is_claimed(pair):
         return
     if pair.constant is None:
+        pair = at_numbers(pair)
         check_positive(pair, error_samples(pair), np.random.default_rng(0))
     else:
         check_constant(pair)

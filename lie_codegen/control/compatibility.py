@@ -16,6 +16,7 @@ import numpy as np
 
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction
+from lie_codegen.control.error_inputs import at_numbers
 from lie_codegen.errors import ExpressionError, IncompatibleError, InputError
 from lie_codegen.exact.exponential import MatrixExponential
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
@@ -58,7 +59,7 @@ class Compatibility:
 
 def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
     """Checks (A2), and that phi is locally positive definite."""
-    real = RealMatrices(error.group)
+    error, real = at_numbers(error), RealMatrices(error.group)
     rng = random.Random(seed)
     data = WeiNormanData(error.group)
     if error.uses_log:

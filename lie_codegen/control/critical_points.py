@@ -23,6 +23,7 @@ from lie_codegen.control.cut_locus import cut_level
 from lie_codegen.control.descent import descend, leads_home, place
 from lie_codegen.control.error_catalogue import as_error
 from lie_codegen.control.error_function import ErrorFunction
+from lie_codegen.control.error_inputs import refuse_inputs
 from lie_codegen.control.error_samples import ErrorSamples, basis_scales, error_samples, random_elements
 from lie_codegen.control.euler_characteristic import euler_characteristic
 from lie_codegen.errors import InputError
@@ -118,7 +119,7 @@ def found_points(pair: ErrorFunction, seed: int = 0) -> CriticalPoints:
     Raises:
         InputError: as `critical_points`.
     """
-    samples, rng = error_samples(pair), np.random.default_rng(seed)
+    samples, rng = error_samples(refuse_inputs(pair)), np.random.default_rng(seed)
     check_positive(pair, samples, rng)
     if pair.uses_log:
         return _up_to_the_cut(pair, samples, rng)

@@ -21,12 +21,15 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols, error_function
+from lie_codegen.control.error_inputs import refuse_inputs
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.definition import record_factory
+from lie_codegen.kernel.kernel import Port
+from lie_codegen.kernel.parameter import input_symbols, is_input
 from lie_codegen.on_demand import sympy as sp
 
 Gains = Mapping[str, Any]
@@ -66,7 +69,7 @@ def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunctio
     Args:
         group: SO(n), SE(n), or any group for "frobenius".
         name: see the module.
-        gains: K_p for SO(n) and "geodesic"; K_1 and K_2 for SE(n); k_p for "frobenius". A number, a diagonal or a matrix.
+        gains: K_p for SO(n) and "geodesic"; K_1 and K_2 for SE(n); k_p for "frobenius". A number, a diagonal or a matrix; or "input".
 
     Raises:
         InputError: no such pair on this group, a gain is missing, or it is not positive as it must be.
@@ -86,7 +89,16 @@ def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunctio
 
 
 def as_error(group: MatrixGroup, error: Any, gains: Mapping[str, Any]) -> ErrorFunction:
-    """An `ErrorFunction` from what `tracking_law` accepts.
+    """An `ErrorFunction` from what `tracking_law` accepts, all its gains numbers.
+
+    Raises:
+        InputError: none of these, a pair of another group, or a gain that is "input".
+    """
+    return refuse_inputs(law_error(group, error, gains))
+
+
+def law_error(group: MatrixGroup, error: Any, gains: Mapping[str, Any]) -> ErrorFunction:
+    """The same for a law, where gains may be inputs.
 
     Raises:
         InputError: none of these, or a pair of another group.
@@ -135,21 +147,35 @@ def _kind(group: MatrixGroup) -> str:
     return "se" if e >= 2 and group.dim == e * (e + 1) // 2 and rigid else ""
 
 
+def _read_gain(
+    gains: Gains, name: str, error: str, size: int = 0, matrix: Callable[[Any, int, str], Any] = positive_matrix
+) -> tuple[Any, tuple[Port, ...]]:
+    """A gain as a number (size 0) or a matrix; or its symbols, and the port that it is an input by."""
+    value = gain(gains, name, f"the error function {error}")
+    if not is_input(value):
+        return (matrix(value, size, name) if size else positive_number(value, name)), ()
+    said = "of the error function" + (", symmetric" if size else "")
+    # The sum of any two eigenvalues of an attitude gain is positive; one of them may be negative.
+    port = Port(name, (size, size) if size else (), description=said, any_sign=matrix is attitude_gain)
+    return input_symbols(port), (port,)
+
+
 def _frobenius(group: MatrixGroup, gains: Gains) -> ErrorFunction:
     symbols = ErrorSymbols(group)
-    k = positive_number(gain(gains, "k_p", "the error function frobenius"), "k_p")
+    k, inputs = _read_gain(gains, "k_p", "frobenius")
     error = symbols.X_d_inverse * (symbols.X - symbols.X_d)  # X_d^-1 X - 1 without its cancellation
     return ErrorFunction(
         "frobenius", group, k * sp.Add(*[entry**2 for entry in error.flat()]) / 2, "right",
-        description="sum of squares of X_d^-1 X - 1; left-invariant",
+        description="sum of squares of X_d^-1 X - 1; left-invariant", inputs=inputs,
     )  # fmt: skip
 
 
 def _geodesic(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
-    K = positive_matrix(gain(gains, "K_p", f"the error function {name}"), group.dim, "K_p")
+    n = group.dim
+    K, inputs = _read_gain(gains, "K_p", name, n)
     phi = _square(K, sp.Matrix(ErrorSymbols(group).log_right)) / 2
     least = None
-    if RealMatrices(group).rigid is not None and group.dim == 3:
+    if RealMatrices(group).rigid is not None and n == 3 and not inputs:
         least = float(eigenvalues(K)[0]) * math.pi**2 / 2  # phi on the cut, |x| = pi
     return ErrorFunction(
         name,
@@ -158,22 +184,24 @@ def _geodesic(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
         "right",
         constant=least,
         description="x^T K_p x/2, x = log(X_d^-1 X); left-invariant, up to the cut",
+        inputs=inputs,
     )
 
 
 def _rotations(group: MatrixGroup, name: str, side: str, gains: Gains) -> ErrorFunction:
     symbols = ErrorSymbols(group)
-    K = attitude_gain(gain(gains, "K_p", f"the error function {name}"), group.degree, "K_p")
+    d = group.degree
+    K, inputs = _read_gain(gains, "K_p", name, d, attitude_gain)
     R, R_d = symbols.X, symbols.X_d
-    return ErrorFunction(name, group, _attitude(K, R - R_d, side), side, constant=_least_pair(K))
+    return ErrorFunction(name, group, _attitude(K, R - R_d, side), side, constant=_least_pair(K), inputs=inputs)
 
 
 def _motions(group: MatrixGroup, row: str, gains: Gains) -> ErrorFunction:
     symbols = ErrorSymbols(group)
     e = group.degree - 1
     name = f"se{e}_{row}"
-    K1 = attitude_gain(gain(gains, "K_1", f"the error function {name}"), e, "K_1")
-    K2 = positive_matrix(gain(gains, "K_2", f"the error function {name}"), e, "K_2")
+    K1, first = _read_gain(gains, "K_1", name, e, attitude_gain)
+    K2, second = _read_gain(gains, "K_2", name, e)
     R, p = symbols.X[:e, :e], symbols.X[:e, e]
     S, q = symbols.X_d[:e, :e], symbols.X_d[:e, e]
     offset: dict[str, Callable[[], sp.MatrixBase]] = {
@@ -188,7 +216,7 @@ def _motions(group: MatrixGroup, row: str, gains: Gains) -> ErrorFunction:
     phi = _attitude(K1, R - S, "right" if row in "1234" else "left") + _square(K2, offset[row]()) / 2
     kind, tau = {"1": ("element", _element(R.T * S, 0 * p)), "5": ("left", None), "6": (
         "element", _element(sp.eye(e), S.T * q - R.T * p))}.get(row, ("right", None))  # fmt: skip
-    return ErrorFunction(name, group, phi, kind, tau, None, _least_pair(K1), _ROWS[row])
+    return ErrorFunction(name, group, phi, kind, tau, None, _least_pair(K1), _ROWS[row], (*first, *second))
 
 
 def _attitude(K: sp.MatrixBase, difference: sp.MatrixBase, side: str) -> sp.Expr:
@@ -212,7 +240,9 @@ def _element(R: sp.MatrixBase, p: sp.MatrixBase) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix(sp.Matrix.vstack(sp.Matrix.hstack(R, p), bottom))
 
 
-def _least_pair(K: sp.MatrixBase) -> float:
-    """min over i != j of k_i + k_j."""
+def _least_pair(K: sp.MatrixBase) -> float | None:
+    """min over i != j of k_i + k_j; None for a gain that is an input."""
+    if K.free_symbols:
+        return None
     values = eigenvalues(K)
     return float(values[0] + values[1])

@@ -9,6 +9,7 @@ X -> X A_a and X^{-1} -> -A_a X^{-1} are the only rules; nothing is differenced 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
 from lie_codegen.groups.derivation import GroupDerivation
@@ -20,18 +21,28 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.dual import DualArithmetic, split, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Matrix, Vector, bracket, matmul, matvec, minus, negative
+from lie_codegen.kernel.parameter import symbol_values
 from lie_codegen.on_demand import sympy as sp
 
 
 class ErrorDerivatives:
-    """One pair at one point (X, X_d), in one arithmetic."""
+    """One pair at one point (X, X_d), in one arithmetic; `inputs` are the values of the gains that are inputs."""
 
-    def __init__(self, ops: Arithmetic, error: ErrorFunction, real: RealMatrices, X: Matrix, X_d: Matrix) -> None:
+    def __init__(
+        self,
+        ops: Arithmetic,
+        error: ErrorFunction,
+        real: RealMatrices,
+        X: Matrix,
+        X_d: Matrix,
+        inputs: Sequence[Any] = (),
+    ) -> None:
         self.ops = ops
         self.error = error
         self.real = real
         self.group = GroupMatrices(ops, real)
         self.X, self.X_d = X, X_d
+        self.inputs = symbol_values(error.inputs, inputs)
         self.X_inverse, self.X_d_inverse = self.group.inverse(X), self.group.inverse(X_d)
         self.dual = DualArithmetic(ops)
 
@@ -98,7 +109,7 @@ class ErrorDerivatives:
     def _values(self, X: Matrix, Xi: Matrix, Xd: Matrix, Xdi: Matrix) -> dict[sp.Symbol, Scalar]:
         names = ErrorSymbols(self.real.group)
         symbols = names.matrices
-        values: dict[sp.Symbol, Scalar] = {}
+        values = dict(self.inputs)
         if self.error.uses_log:
             for coordinates, E in ((names.log_right, (Xdi, X)), (names.log_left, (X, Xdi))):
                 if any(

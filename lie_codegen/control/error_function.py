@@ -17,8 +17,11 @@ from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.definition import record_factory
+from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.matrix_formula import MatrixLog, matrix_formula, scalar_formula
+from lie_codegen.kernel.parameter import is_input
 from lie_codegen.on_demand import sympy as sp
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
@@ -118,6 +121,7 @@ class ErrorFunction:
         P: (n, n) matrix nu = P xi_d, for "matrix".
         constant: L such that phi is quadratic below it (A1), None when it is not known.
         description: one line.
+        inputs: the gains that are no numbers but inputs of the law; see `error_inputs`.
     """
 
     name: str
@@ -128,6 +132,7 @@ class ErrorFunction:
     P: sp.ImmutableMatrix | None = None
     constant: float | None = None
     description: str = field(default="", compare=False)
+    inputs: tuple[Port, ...] = ()
 
     @property
     def uses_log(self) -> bool:
@@ -155,12 +160,12 @@ def error_function(
             "tr(K*(1 - Xd^-1*X))/2" (names X, Xd, ^-1, ' for the transpose, tr, norm2 for the sum of squares, log(Xd^-1*X) and
             log(X*Xd^-1), matrices of the algebra, and vee of these, (n, 1)).
         transport: "right", "left", {"tau": matrix or text} for nu = Ad_tau xi_d, or {"P": n x n rows} for nu = P xi_d.
-        parameters: numbers and matrices by the names that the texts use.
+        parameters: numbers and matrices by the names that the texts use; "input" for a number that is an input of the law.
         constant: L of (A1) if you know it; then the region of attraction is reported.
         name: C identifier.
 
     Raises:
-        InputError: unknown transport, an unknown symbol; compatibility is checked by `check_compatibility`.
+        InputError: unknown transport, an unknown symbol, a constant beside numbers that are inputs; compatibility is checked by `check_compatibility`.
         ExpressionError: a text outside the grammar, with the column.
     """
     group = as_group(group, "error_function")
@@ -168,7 +173,16 @@ def error_function(
     values = _parameters(parameters or {}, symbols)
     expression = _phi(phi, symbols, values)
     tau, P, kind = _transport(transport, symbols, values)
-    return ErrorFunction(name, group, expression, kind, tau, P, constant)
+    inputs = tuple(
+        Port(key, (), description="of the error function", any_sign=True)
+        for key in values
+        if is_input((parameters or {})[key])
+    )
+    if inputs and constant is not None:
+        raise InputError(
+            f"error_function: constant = {constant:g} is of one phi, and {', '.join(port.name for port in inputs)} can be any: leave constant away"
+        )
+    return ErrorFunction(name, group, expression, kind, tau, P, constant, inputs=inputs)
 
 
 def _parameters(parameters: Mapping[str, Any], symbols: ErrorSymbols) -> dict[str, Any]:
@@ -177,7 +191,9 @@ def _parameters(parameters: Mapping[str, Any], symbols: ErrorSymbols) -> dict[st
         if key in symbols.names or key in symbols.matrices:
             raise InputError(f"parameter {key!r} has the name of an entry of the configuration; rename it")
         rows = value.tolist() if hasattr(value, "tolist") else value
-        if isinstance(rows, list | tuple):
+        if is_input(rows):
+            values[key] = sp.Symbol(check_identifier(key, "parameter"))
+        elif isinstance(rows, list | tuple):
             table = rows if rows and isinstance(rows[0], list | tuple) else [[entry] for entry in rows]
             values[key] = sp.ImmutableMatrix([[real_number(entry, key) for entry in row] for row in table])
         else:
@@ -191,7 +207,7 @@ def _phi(phi: Any, symbols: ErrorSymbols, values: Mapping[str, Any]) -> sp.Expr:
     if not isinstance(phi, sp.Expr):
         raise InputError(f"phi must be a text or a SymPy expression, got {type(phi).__name__}")
     expression = phi.subs({sp.Symbol(key): value for key, value in values.items() if isinstance(value, sp.Expr)})
-    _check_symbols("phi", expression.free_symbols, symbols)
+    _check_symbols("phi", expression.free_symbols - _inputs(values), symbols)
     return _smooth(expression)
 
 
@@ -234,7 +250,7 @@ def _matrix(what: str, rows: Any, symbols: ErrorSymbols, values: Mapping[str, An
         matrix = sp.ImmutableMatrix([[_entry(entry, names) for entry in row] for row in rows])
     if matrix.shape != (size, size):
         raise ShapeError(f"{what} is {matrix.rows} x {matrix.cols}; it must be {size} x {size}")
-    _check_symbols(what, matrix.free_symbols, symbols)
+    _check_symbols(what, matrix.free_symbols - _inputs(values), symbols)
     return matrix
 
 
@@ -242,6 +258,10 @@ def _entry(entry: Any, names: Mapping[str, sp.Expr]) -> sp.Expr:
     if isinstance(entry, str):
         return parse_expression(entry, names, FORMULA_FUNCTIONS)
     return entry if isinstance(entry, sp.Expr) else real_number(entry, "an entry of the transport")
+
+
+def _inputs(values: Mapping[str, Any]) -> set[sp.Symbol]:
+    return {value for value in values.values() if isinstance(value, sp.Symbol)}
 
 
 def _check_symbols(what: str, used: Sequence[sp.Symbol] | set[sp.Symbol], symbols: ErrorSymbols) -> None:

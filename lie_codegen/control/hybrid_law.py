@@ -52,6 +52,7 @@ from lie_codegen.kernel.linear import (
     scaled,
     transpose,
 )
+from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, sample_inputs, values_of
 from lie_codegen.on_demand import scipy
 
 #: Two pair sums that differ by less, relative to the largest, give critical circles, on which the gap is zero.
@@ -136,8 +137,8 @@ def hybrid_law(
 
     Args:
         group: SO(3).
-        inertia: of the body.
-        K_p: gain of phi, its eigenvalues distinct; K_d: dissipation.
+        inertia: of the body, K_d: dissipation; either may be "input": an input of that name, behind the others.
+        K_p: gain of phi, its eigenvalues distinct.
         kappa: of the warp; nine tenths of kappa_max if not given.
         direction: (3,) u in body axes; the best one if not given.
         hysteresis: delta; half of the gap if not given. It must exceed what noise does to Phi.
@@ -153,7 +154,21 @@ def hybrid_law(
         raise InputError(f"hybrid_law is one of SO(3) with the axes as its basis, not of {group.name}")
     if feedforward not in FEEDFORWARDS:
         raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
-    K, D, metric = attitude_gain(K_p, 3, "K_p"), positive_matrix(K_d, 3, "K_d"), body_inertia(inertia)
+    for what, value in (("K_p", K_p), ("kappa", kappa), ("direction", direction), ("hysteresis", hysteresis)):
+        refuse_input(
+            value,
+            f"hybrid_law: {what}",
+            "the gap, below which the jump must stay, is computed from it when the law is made",
+        )
+    K = attitude_gain(K_p, 3, "K_p")
+    parameters = (
+        parameter(Port("inertia", (3, 3), description="of the body, symmetric"), inertia, body_inertia),
+        parameter(
+            Port("K_d", (3, 3), description="dissipation, symmetric"),
+            K_d,
+            lambda value, what: positive_matrix(value, 3, what),
+        ),
+    )
     gain = as_floats(K)
     u, warp, most, gaps = _warp(gain, kappa, direction)
     delta = min(gaps) / 2 if hysteresis is None else float(hysteresis)
@@ -164,8 +179,9 @@ def hybrid_law(
     derivation = GroupDerivation(group)
 
     def body(
-        ops: Arithmetic, X: Matrix, xi: Vector, X_d: Matrix, xi_d: Vector, xi_d_dot: Vector, q: Scalar
+        ops: Arithmetic, X: Matrix, xi: Vector, X_d: Matrix, xi_d: Vector, xi_d_dot: Vector, q: Scalar, *given: Any
     ) -> tuple[Any, ...]:
+        metric, D = values_of(ops, parameters, given)
         E = matmul(transpose(X_d), X)
         weights, axis = constant_matrix(ops, K), [ops.constant(x) for x in u]
         phi, slope = _trace(weights, E, _gap_matrix(X, X_d))
@@ -182,14 +198,21 @@ def hybrid_law(
         nu = matvec(transpose(E), xi_d)
         turned = matvec(transpose(E), xi_d_dot)
         nu_dot = minus(turned, bracket(ops, group.algebra, xi, nu))
-        inertia_matrix = constant_matrix(ops, metric)
-        forward = feedforward_force(ops, real, inertia_matrix, feedforward, xi, nu, nu_dot, turned)
-        damping = matvec(constant_matrix(ops, D), minus(xi, nu))
+        forward = feedforward_force(ops, real, metric, feedforward, xi, nu, nu_dot, turned)
+        damping = matvec(D, minus(xi, nu))
         return plus(negative(pull), negative(damping), forward), chosen
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         vectors = [[rng.uniform(-1, 1) for _ in range(3)] for _ in range(3)]
-        return _rotation(rng), vectors[0], _rotation(rng), vectors[1], vectors[2], rng.choice([-1.0, 1.0])
+        return (
+            _rotation(rng),
+            vectors[0],
+            _rotation(rng),
+            vectors[1],
+            vectors[2],
+            rng.choice([-1.0, 1.0]),
+            *sample_inputs(parameters, rng),
+        )
 
     speed = velocity_units(group)
     made = HybridLaw(
@@ -202,6 +225,7 @@ def hybrid_law(
             Port("xi_d", (3,), speed, description="reference velocity"),
             Port("xi_d_dot", (3,), velocity_units(group, "s^2"), description="its rate of change"),
             Port("q", (), description="which of the two functions: 1 or -1, held between calls"),
+            *input_ports(parameters),
         ),
         outputs=(
             Port("force", (3,), force_units(group), description="body torque"),

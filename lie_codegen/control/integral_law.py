@@ -9,14 +9,15 @@ wind up.
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from lie_codegen.control.error_catalogue import as_error, gain
+from lie_codegen.control.error_catalogue import gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.tracking_law import tracking_law
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices
@@ -24,10 +25,12 @@ from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, constant_matrix, matvec, minus, number, plus, scaled
+from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, matvec, minus, plus, scaled
+from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
+from lie_codegen.kernel.small_inverse import inverse
 from lie_codegen.on_demand import sympy as sp
 
-#: Inputs of a tracking law whose numbers are all compiled in.
+#: Inputs of a tracking law before its numbers.
 _TRACKING = 5
 
 
@@ -49,7 +52,8 @@ def integral_law(
         gains: those of `tracking_law`, K_i, and optionally c (default 1/2) and w, the anti-windup rate (default 1
         for finite
             limits: s follows K_i^{-1} times the excess).
-        limits: largest absolute force, a number or one a component; None for none.
+        limits: largest absolute force, a number or one a component; None for none. Each of these numbers may be "input": an input of that
+            name, behind the others.
         name: C identifier.
 
     Raises:
@@ -60,33 +64,39 @@ def integral_law(
         key: value for key, value in gains.items() if key not in ("c", "w") and key.replace("_", "").lower() != "ki"
     }
     law = tracking_law(group, inertia=inertia, error=error, gains=rest, feedforward=feedforward, name=name)
-    if len(law.inputs) != _TRACKING:
-        raise InputError('an integral law has its numbers compiled in: inertia and gains cannot be "input"')
-    pair = as_error(group, error, rest)
-    K_i = positive_matrix(gain(gains, "K_i", "an integral law"), group.dim, "K_i")
-    K_d = positive_matrix(gain(gains, "K_d", "an integral law"), group.dim, "K_d")
-    c, w = positive_number(gains.get("c", "1/2"), "c"), positive_number(gains.get("w", 1), "w")
-    bounds = force_limits(limits, group.dim)
+    pair, n = law_error(group, error, rest), group.dim
+    K_d = _matrix_gain(gains, "K_d", "dissipation", n)
+    of_tracking = law.inputs[_TRACKING:]
+    own = (
+        _matrix_gain(gains, "K_i", "of the integral", n),
+        parameter(
+            Port("c", (), description="share of d_1 phi in the integral"), gains.get("c", "1/2"), positive_number
+        ),
+        parameter(Port("w", (), "1/s", description="rate of the anti-windup"), gains.get("w", 1), positive_number),
+        *force_limits(limits, n),
+    )
     real = RealMatrices(group)
 
     def body(
-        ops: Arithmetic, X: Any, xi: Vector, X_d: Any, xi_d: Vector, xi_d_dot: Vector, s: Vector
+        ops: Arithmetic, X: Any, xi: Vector, X_d: Any, xi_d: Vector, xi_d_dot: Vector, s: Vector, *given: Any
     ) -> tuple[Any, ...]:
-        free, phi, W, _ = law.evaluate(ops, X, xi, X_d, xi_d, xi_d_dot)
+        theirs, ours = given[: len(of_tracking)], given[len(of_tracking) :]
+        free, phi, W, _ = law.evaluate(ops, X, xi, X_d, xi_d, xi_d_dot, *theirs)
+        named = dict(zip((port.name for port in of_tracking), theirs, strict=True))
+        K_i, c, w, *bounds = values_of(ops, own, ours)
         read = GroupMatrices(ops, real).read
-        at = ErrorDerivatives(ops, pair, real, read(X), read(X_d))
+        at = ErrorDerivatives(ops, pair, real, read(X), read(X_d), [named[port.name] for port in pair.inputs])
         _, slope = at.differential(1)
-        wanted = minus(free, matvec(constant_matrix(ops, K_i), s))
-        force = saturated(ops, wanted, bounds)
-        rate = plus(
-            minus(xi, at.transported(xi_d)), scaled(number(ops, c), matvec(constant_matrix(ops, K_d.inv()), slope))
-        )
-        if bounds is not None:
-            excess = matvec(constant_matrix(ops, K_i.inv()), minus(wanted, force))
-            rate = plus(rate, scaled(number(ops, w), excess))
+        wanted = minus(free, matvec(K_i, s))
+        force = saturated(ops, wanted, *bounds)
+        rate = plus(minus(xi, at.transported(xi_d)), scaled(c, matvec(_inverse(ops, K_d, named.get("K_d")), slope)))
+        if bounds:
+            excess = matvec(_inverse(ops, own[0], K_i), minus(wanted, force))
+            rate = plus(rate, scaled(w, excess))
         return force, rate, phi, W
 
-    inputs = (*law.inputs, Port("integral", (group.dim,), description="the integral s, zero at the start"))
+    integral = Port("integral", (n,), description="the integral s, zero at the start")
+    inputs = (*law.inputs[:_TRACKING], integral, *of_tracking, *input_ports(own))
     outputs = (law.outputs[0], Port("integral_dot", (group.dim,), description="s'"), law.outputs[1], law.outputs[2])
     sampler = law.sampler
     return replace(
@@ -95,15 +105,28 @@ def integral_law(
         outputs=outputs,
         body=body,
         formula="f = sat(f_0 - K_i s), s' = xi_e + c K_d^-1 d_1 phi + w K_i^-1 (f_0 - K_i s - f)",
-        sampler=None
-        if sampler is None
-        else lambda rng: (*sampler(rng), [rng.uniform(-1, 1) for _ in range(group.dim)]),
+        sampler=None if sampler is None else lambda rng: _sample(sampler(rng), n, own, rng),
     )
+
+
+def _sample(tracking: tuple[Any, ...], n: int, own: Sequence[Parameter], rng: random.Random) -> tuple[Any, ...]:
+    s = [rng.uniform(-1, 1) for _ in range(n)]
+    return *tracking[:_TRACKING], s, *tracking[_TRACKING:], *sample_inputs(own, rng)
+
+
+def _matrix_gain(gains: Mapping[str, Any], name: str, what: str, n: int) -> Parameter:
+    port = Port(name, (n, n), description=f"{what}, symmetric")
+    return parameter(port, gain(gains, name, "an integral law"), lambda value, name: positive_matrix(value, n, name))
+
+
+def _inverse(ops: Arithmetic, gain: Parameter, value: Any) -> Matrix:
+    """Of a gain: exact where it is a number, else from the input's value at each call."""
+    return inverse(ops, value) if gain.value is None else constant_matrix(ops, gain.value.inv())
 
 
 @kernel_factory()
 def with_limits(law: Kernel, limits: Any, name: str | None = None) -> Kernel:
-    """The same law with its first output, a force or velocity, clipped to +-limits component by component.
+    """The same law with its first output, a force or velocity, clipped to +-limits component by component; "input" for an input.
 
     Raises:
         ShapeError: the first output is not a vector, or the limits have another length.
@@ -111,23 +134,35 @@ def with_limits(law: Kernel, limits: Any, name: str | None = None) -> Kernel:
     """
     if len(law.outputs[0].shape) != 1:
         raise ShapeError(f"{law.name}: the first output is not a vector, so it has no component limits")
-    bounds = force_limits(limits, law.outputs[0].shape[0])
+    bounds, count, sampler = force_limits(limits, law.outputs[0].shape[0]), len(law.inputs), law.sampler
 
     def body(ops: Arithmetic, *arguments: Any) -> tuple[Any, ...]:
-        first, *others = law.evaluate(ops, *arguments)
-        return saturated(ops, first, bounds), *others
+        first, *others = law.evaluate(ops, *arguments[:count])
+        return saturated(ops, first, *values_of(ops, bounds, arguments[count:])), *others
 
-    return replace(law, name=name or law.name, body=body, formula=f"{law.formula}; clipped to +-limits")
+    return replace(
+        law,
+        name=name or law.name,
+        inputs=(*law.inputs, *input_ports(bounds)),
+        body=body,
+        formula=f"{law.formula}; clipped to +-limits",
+        sampler=None if sampler is None else lambda rng: (*sampler(rng), *sample_inputs(bounds, rng)),
+    )
 
 
-def force_limits(limits: Any, size: int) -> list[sp.Expr] | None:
-    """Positive limits, one a component; None for none.
+def force_limits(limits: Any, size: int) -> tuple[Parameter, ...]:
+    """Positive limits, one a component, as one parameter; () for none.
 
     Raises:
         ShapeError, InputError: another length; a limit that is not positive.
     """
     if limits is None:
-        return None
+        return ()
+    port = Port("limits", (size,), description="largest magnitude of each component")
+    return (parameter(port, limits, lambda value, _: _limits(value, size)),)
+
+
+def _limits(limits: Any, size: int) -> list[sp.Expr]:
     many = (isinstance(limits, Sequence) and not isinstance(limits, str)) or hasattr(limits, "tolist")
     values = limits if many else [limits] * size
     if len(values) != size:
@@ -135,13 +170,13 @@ def force_limits(limits: Any, size: int) -> list[sp.Expr] | None:
     return [positive_number(value, f"limits[{i}]") for i, value in enumerate(values)]
 
 
-def saturated(ops: Arithmetic, vector: Sequence[Scalar], limits: Sequence[sp.Expr] | None) -> Vector:
+def saturated(ops: Arithmetic, vector: Sequence[Scalar], limits: Sequence[Scalar] | None = None) -> Vector:
     """min(max(v, -limit), limit), component by component."""
     if limits is None:
         return list(vector)
     result: Vector = []
     for value, limit in zip(vector, limits, strict=True):
-        high = ops.constant(limit)
+        high = ops.constant(limit) if isinstance(limit, int) else limit
         low = -high
         clipped = ops.where(ops.less(high, value), high, value)
         result.append(ops.where(ops.less(value, low), low, clipped))

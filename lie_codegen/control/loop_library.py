@@ -107,7 +107,7 @@ def loop_numbers(
         if name in numbers:
             continue
         if name in gains:
-            numbers[name] = checked(port, gains[name], positive=name not in free)
+            numbers[name] = checked(port, gains[name], positive=not port.any_sign and name not in free)
         else:
             numbers[name] = _single(inertia, port.shape[0])
     numbers |= {name: spread(ports[name], value) for name, value in others.items()}
@@ -176,7 +176,7 @@ def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
         bad = (least <= 0) | (skew > 1e-12 * np.max(np.abs(array), axis=(-1, -2)))
         wanted = "symmetric positive definite"
     else:
-        bad, wanted = array <= 0, "positive"
+        bad, wanted = np.any(array <= 0, axis=tuple(range(array.ndim - len(port.shape), array.ndim))), "positive"
     if np.any(bad):
         first = int(np.flatnonzero(bad)[0])
         where = f" of loop {first}" if array.ndim == ranks[1] else ""

@@ -177,10 +177,13 @@ def _parameters(law: Kernel) -> Mapping[str, Any]:
 
 def _is_parameter(law: Kernel, port: Port) -> bool:
     """By what the law is defined by: a number of that name, there or among its gains."""
-    given = _parameters(law)
-    nested = [value for value in given.values() if isinstance(value, Mapping)]
-    names = {_letters(key) for each in (given, *nested, *(n.get("parameters", {}) for n in nested)) for key in each}
-    return _letters(port.name) in names
+    return _letters(port.name) in _names(_parameters(law))
+
+
+def _names(given: Mapping[str, Any]) -> set[str]:
+    """Of all numbers in a definition: its own, of its gains, and of the laws, vehicles and error functions among its parameters."""
+    inner = [_names(value) for value in given.values() if isinstance(value, Mapping)]
+    return {_letters(key) for key in given}.union(*inner)
 
 
 def _letters(name: str) -> str:

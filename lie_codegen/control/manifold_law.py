@@ -11,7 +11,7 @@ CIT-CDS 97-003, Theorem 4.2, (11), (13), (14), (29), (30).
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,11 +20,22 @@ import numpy as np
 from lie_codegen.control.manifold import PLACES, Manifold, read_formula, read_rows, symbols_of
 from lie_codegen.errors import IncompatibleError, InputError
 from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, matvec, minus, negative, plus
+from lie_codegen.kernel.parameter import (
+    Parameter,
+    check_numbers,
+    input_ports,
+    input_symbols,
+    is_input,
+    parameter,
+    sample_ports,
+    symbol_values,
+)
 from lie_codegen.on_demand import sympy as sp
 
 _COMPATIBLE = 1e-10
@@ -50,7 +61,8 @@ def manifold_law(
             (q.r) 1 - r q^T. There is no default: T = -M^-1 d_1 phi (d_2 phi)^T/|d_1 phi|^2 always exists and is singular at q = r.
         K_d: dissipation: a number, N entries, or rows of texts in q1 .. qN.
         S: rows of an antisymmetric matrix in q, v, r, w (v for q_dot, w for r_dot), whose force S e is added.
-        parameters: numbers by name.
+        parameters: numbers by name. They and K_d may be "input": an input of that name, behind the others; what is checked is checked
+            at positive fractions.
         name: C identifier.
 
     Raises:
@@ -60,8 +72,15 @@ def manifold_law(
     """
     if not isinstance(manifold, Manifold):
         raise InputError(f"manifold_law takes a manifold of lc.manifold, got {type(manifold).__name__}")
-    pair = _pair(manifold, phi, transport, K_d, S, parameters or {})
-    _check(manifold, pair)
+    named = [
+        parameter(Port(check_identifier(key, "parameter"), (), any_sign=True), value, real_number)
+        for key, value in (parameters or {}).items()
+    ]
+    inputs = input_ports(named)
+    if is_input(K_d):
+        inputs = (Port("K_d", (manifold.size,) * 2, description="dissipation, symmetric"), *inputs)
+    pair = _pair(manifold, phi, transport, K_d, S, named)
+    _check(manifold, pair.at_numbers(inputs))
     N, q, r = manifold.size, manifold.q, symbols_of("r", manifold.size)
     slope = [sp.diff(pair.phi, x) for x in q]
     v, w = symbols_of("v", N), symbols_of("w", N)
@@ -69,8 +88,10 @@ def manifold_law(
     by_q = [[sp.diff(entry, x) for x in q] for entry in moved]
     by_r = [[sp.diff(entry, x) for x in r] for entry in moved]
 
-    def body(ops: Arithmetic, at: Vector, speed: Vector, ref: Vector, rate: Vector, turn: Vector) -> tuple[Any, ...]:
-        values = dict(zip([*q, *v, *r, *w], [*at, *speed, *ref, *rate], strict=True))
+    def body(
+        ops: Arithmetic, at: Vector, speed: Vector, ref: Vector, rate: Vector, turn: Vector, *given: Any
+    ) -> tuple[Any, ...]:
+        values = dict(zip([*q, *v, *r, *w], [*at, *speed, *ref, *rate], strict=True)) | symbol_values(inputs, given)
         evaluate = ExpressionEvaluator(ops, values)
 
         def rows(matrix: Any) -> list[Vector]:
@@ -98,7 +119,14 @@ def manifold_law(
         at, ref = manifold.places(2, draw)
         flat = draw.normal(size=(3, N))
         vectors = [manifold.along(at, flat[0]), manifold.along(ref, flat[1]), flat[2]]
-        return at.tolist(), vectors[0].tolist(), ref.tolist(), vectors[1].tolist(), vectors[2].tolist()
+        return (
+            at.tolist(),
+            vectors[0].tolist(),
+            ref.tolist(),
+            vectors[1].tolist(),
+            vectors[2].tolist(),
+            *sample_ports(inputs, rng),
+        )
 
     return Kernel(
         name=name,
@@ -111,6 +139,7 @@ def manifold_law(
             Port(
                 "r_ddot", (N,), "1/s^2", description="second derivative in R^N, its part across the manifold included"
             ),
+            *inputs,
         ),
         outputs=(
             Port("force", (N,), description="force F of nabla_q' q' = M^-1 (F - dV), a covector on the manifold"),
@@ -132,11 +161,17 @@ class _Pair:
     K_d: sp.ImmutableMatrix
     S: sp.ImmutableMatrix | None
 
+    def at_numbers(self, inputs: Sequence[Port]) -> _Pair:
+        """With numbers in place of the inputs."""
+        values = check_numbers(inputs)
+        S = None if self.S is None else self.S.xreplace(values)
+        return _Pair(self.phi.xreplace(values), self.T.xreplace(values), self.K_d.xreplace(values), S)
 
-def _pair(manifold: Manifold, phi: Any, transport: Any, K_d: Any, S: Any, parameters: Mapping[str, Any]) -> _Pair:
+
+def _pair(manifold: Manifold, phi: Any, transport: Any, K_d: Any, S: Any, parameters: Sequence[Parameter]) -> _Pair:
     N = manifold.size
     names: dict[str, sp.Expr] = {"pi": sp.pi}
-    names |= {key: real_number(value, key) for key, value in parameters.items()}
+    names |= {each.port.name: input_symbols(each.port) if each.value is None else each.value for each in parameters}
     of_q = names | {s.name: s for s in manifold.q}
     both = of_q | {s.name: s for s in symbols_of("r", N)}
     moving = both | {s.name: s for letter in "vw" for s in symbols_of(letter, N)}
@@ -149,7 +184,8 @@ def _pair(manifold: Manifold, phi: Any, transport: Any, K_d: Any, S: Any, parame
     operator = None if S is None else read_rows(S, N, moving, "S")
     if operator is not None and any(sp.simplify(x) != 0 for x in (operator + operator.T).flat()):
         raise InputError("manifold_law: S is not antisymmetric, so that its force would change dW/dt")
-    return _Pair(read_formula(phi, both, "phi"), T, read_rows(K_d, N, of_q, "K_d"), operator)
+    damping = input_symbols(Port("K_d", (N, N))) if is_input(K_d) else read_rows(K_d, N, of_q, "K_d")
+    return _Pair(read_formula(phi, both, "phi"), T, damping, operator)
 
 
 def _check(manifold: Manifold, pair: _Pair) -> None:

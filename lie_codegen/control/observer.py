@@ -34,6 +34,8 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matmul, matvec, minus, number, plus, scaled
+from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
+from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import scipy
 from lie_codegen.on_demand import sympy as sp
 
@@ -48,8 +50,8 @@ class Observer(Kernel):
     Attributes:
         basis: (n, d, d) the matrices A_a of its group.
         vectors: (k, d) the c_i.
-        weights: (k,) k_i.
-        k_p, k_i: gains.
+        weights: (k,) k_i; () for an input.
+        k_p, k_i: gains; NaN for an input.
     """
 
     basis: tuple[Any, ...] = field(default=(), repr=False)
@@ -76,7 +78,15 @@ class Observer(Kernel):
 
     @cached_property
     def A(self) -> Array:
-        """(n, n) Hessian of f at X^ = X = 1: sum k_i (A_a c_i).(A_b c_i); on SO(3) sum k_i (1 - z_i z_i^T)."""
+        """(n, n) Hessian of f at X^ = X = 1: sum k_i (A_a c_i).(A_b c_i); on SO(3) sum k_i (1 - z_i z_i^T).
+
+        Raises:
+            InputError: weights, k_p or k_i are inputs.
+        """
+        if not self.weights or np.isnan(self.k_p) or np.isnan(self.k_i):
+            raise InputError(
+                "observer: A, poles and covariance are of numbers; weights, k_p or k_i of this one are inputs"
+            )
         return np.asarray(np.einsum("k,kai,kbi->ab", np.array(self.weights), self.moved, self.moved))
 
     @cached_property
@@ -138,7 +148,8 @@ def observer(
         points: (k, n) inertial positions p of landmarks: y = R^T (p - position), p as the body sees it.
         outputs: (k, d) vectors c of any group: y = X^-1 c.
         weights: (k,) k_i, positive; 1 if not given.
-        k_p: k_P [1/s]; k_i: k_I [1/s^2], 0 for no bias.
+        k_p: k_P [1/s]; k_i: k_I [1/s^2], 0 for no bias. weights, k_p and k_i may be "input": an input of that name, behind the others;
+            `A`, `poles` and `covariance` are of numbers.
         reduced: take vectors that do not determine the state, as one direction: the heading is then not observed.
         name: C identifier.
 
@@ -153,10 +164,15 @@ def observer(
     seen = d - 1 if rigid else d
     vectors = _vectors(directions, points, outputs, d, rigid=rigid)
     count = len(vectors)
-    k = [positive_number(w, f"weights[{i}]") for i, w in enumerate(_weights(weights, count))]
-    p, i_gain = positive_number(k_p, "k_p"), real_number(k_i, "k_i")
-    if not i_gain >= 0:
-        raise InputError(f"k_i = {i_gain} must not be negative")
+    parameters = (
+        parameter(
+            Port("weights", (count,), description="k_i of the vectors"),
+            weights,
+            lambda value, _: _weights(value, count),
+        ),
+        parameter(Port("k_p", (), "1/s", description="gain of the estimate"), k_p, positive_number),
+        parameter(Port("k_i", (), "1/s^2", description="gain of the bias"), k_i, _not_negative),
+    )
     floats = tuple(tuple(float(x) for x in c) for c in vectors)
     rank, n = _rank(group, floats), group.dim
     if rank < n and not reduced:
@@ -167,20 +183,22 @@ def observer(
         )
     derivation, real = GroupDerivation(group), RealMatrices(group)
 
-    def body(ops: Arithmetic, X_hat: Any, bias: Vector, u: Vector, y: Matrix, h: Scalar) -> tuple[Any, ...]:
+    def body(
+        ops: Arithmetic, X_hat: Any, bias: Vector, u: Vector, y: Matrix, h: Scalar, *given: Any
+    ) -> tuple[Any, ...]:
         matrices = GroupMatrices(ops, real)
+        k, p, i_gain = values_of(ops, parameters, given)
         X = matrices.read(X_hat)
-        correction, rate = corrections(
-            ops, real, X, y, [[number(ops, x) for x in c] for c in vectors], [number(ops, w) for w in k], seen
-        )
-        velocity = minus(minus(u, bias), scaled(number(ops, p), correction))
+        correction, rate = corrections(ops, real, X, y, [[number(ops, x) for x in c] for c in vectors], k, seen)
+        velocity = minus(minus(u, bias), scaled(p, correction))
         moved = matmul(X, exp_matrix(ops, derivation, scaled(h, velocity)))
-        return moved, plus(bias, scaled(h * number(ops, i_gain), rate)) if i_gain != 0 else list(bias)
+        return moved, list(bias) if is_zero(i_gain) else plus(bias, scaled(h * i_gain, rate))
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         X = random_element(group, WeiNormanData(group), rng)
         flat = [[rng.uniform(-0.1, 0.1) for _ in range(n)] for _ in range(2)]
-        return X, *flat, [[rng.uniform(-1, 1) for _ in range(seen)] for _ in range(count)], rng.uniform(0, 0.05)
+        y = [[rng.uniform(-1, 1) for _ in range(seen)] for _ in range(count)]
+        return X, *flat, y, rng.uniform(0, 0.05), *sample_inputs(parameters, rng)
 
     made = Observer(
         name=name,
@@ -191,6 +209,7 @@ def observer(
             Port("u", (n,), velocity_units(group), description="measured body velocity, bias included"),
             Port("y", (count, seen), description="measured vectors, one a row"),
             Port("h", (), "s", description="step"),
+            *input_ports(parameters),
         ),
         outputs=(matrix_port(group, "X_hat_next"), Port("bias_next", (n,), velocity_units(group))),
         body=body,
@@ -199,9 +218,9 @@ def observer(
         sampler=sampler,
         basis=tuple(tuple(map(tuple, matrix)) for matrix in group.basis.tolist()),
         vectors=floats,
-        weights=tuple(float(w) for w in k),
-        k_p=float(p),
-        k_i=float(i_gain),
+        weights=tuple(float(w) for w in parameters[0].value or ()),
+        k_p=_known(parameters[1]),
+        k_i=_known(parameters[2]),
         measured=seen,
     )
     return nan_off_group(made, group, ("X_hat",))  # type: ignore[return-value]
@@ -259,14 +278,25 @@ def _vectors(directions: Any, points: Any, outputs: Any, d: int, *, rigid: bool)
     return found
 
 
-def _weights(weights: Any, count: int) -> list[Any]:
+def _known(gain: Parameter) -> float:
+    return float("nan") if gain.value is None else float(gain.value)
+
+
+def _not_negative(value: Any, name: str) -> sp.Expr:
+    found = real_number(value, name)
+    if not found >= 0:
+        raise InputError(f"{name} = {found} must not be negative")
+    return found
+
+
+def _weights(weights: Any, count: int) -> list[sp.Expr]:
     if weights is None:
-        return [1] * count
+        return [sp.S.One] * count
     values = weights.tolist() if hasattr(weights, "tolist") else weights
     values = list(values) if isinstance(values, list | tuple) else [values] * count
     if len(values) != count:
         raise ShapeError(f"observer: {len(values)} weights for {count} vectors")
-    return values
+    return [positive_number(w, f"weights[{i}]") for i, w in enumerate(values)]
 
 
 def _rank(group: MatrixGroup, vectors: Sequence[Sequence[float]]) -> int:

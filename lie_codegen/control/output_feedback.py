@@ -31,16 +31,15 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
     Matrix,
     Vector,
-    constant_matrix,
     cross,
     matvec,
     minus,
     negative,
-    number,
     plus,
     scaled,
     transpose,
 )
+from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
 from lie_codegen.on_demand import scipy
 
 
@@ -75,7 +74,7 @@ class OutputFeedback(Kernel):
     Attributes:
         directions: (k, 3) unit z_i.
         targets: (k, 3) unit y_i^d.
-        r: (k,) gains towards the targets.
+        r: (k,) gains towards the targets; () for an input.
     """
 
     directions: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
@@ -93,8 +92,10 @@ class OutputFeedback(Kernel):
         The amended potential r (1 - y.y_d) + p^2/(2 y.I y) is minimised from where y is and from 40 other places; the least minimum is given.
 
         Raises:
-            ShapeError, InputError, NotOnGroupError: a state or an inertia that is none.
+            ShapeError, InputError, NotOnGroupError: a state or an inertia that is none; r is an input.
         """
+        if not self.r:
+            raise InputError("offset depends on r, which is an input of this law: make one with that number")
         here = admitted(as_group("so3", "offset"), X, "X").X
         omega, metric = np.asarray(xi, dtype=float), as_floats(body_inertia(inertia))
         if omega.shape != (3,):
@@ -146,7 +147,8 @@ def output_feedback_law(
         target: (3, 3) X_d: y^d = X_d^T z.
         target_directions: (k, 3) y^d instead.
         r, g: (k,) gains, numbers for all; [N m].
-        G: gain of the filter, a number, a diagonal or a (3, 3) matrix [1/(N m s)].
+        G: gain of the filter, a number, a diagonal or a (3, 3) matrix [1/(N m s)]. r, g and G may be "input": an input of that name,
+            behind the others.
         name: C identifier.
 
     Raises:
@@ -164,22 +166,39 @@ def output_feedback_law(
         wanted = _units(target_directions, "target_directions")
     if wanted.shape != z.shape:
         raise ShapeError(f"output_feedback_law: {len(wanted)} target directions for {len(z)} directions")
-    far, near = _gains(r, len(z), "r"), _gains(g, len(z), "g")
-    filter_gain = positive_matrix(G, 3, "G")
+    count = len(z)
+    parameters = (
+        parameter(
+            Port("r", (count,), "N m", description="gains towards the targets"),
+            r,
+            lambda value, name: _gains(value, count, name),
+        ),
+        parameter(
+            Port("g", (count,), "N m", description="gains towards the filter"),
+            g,
+            lambda value, name: _gains(value, count, name),
+        ),
+        parameter(
+            Port("G", (3, 3), "1/(N m s)", description="gain of the filter, symmetric"),
+            G,
+            lambda value, name: positive_matrix(value, 3, name),
+        ),
+    )
 
-    def body(ops: Arithmetic, X_hat: Matrix, y: Matrix) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, X_hat: Matrix, y: Matrix, *given: Any) -> tuple[Any, ...]:
+        far, near, filter_gain = values_of(ops, parameters, given)
         s: Vector = [0, 0, 0]
         pull: Vector = [0, 0, 0]
         turned = transpose(X_hat)
         for k, row in enumerate(y):
             seen = matvec(turned, [ops.constant(float(x)) for x in z[k]])
-            s = plus(s, scaled(number(ops, near[k]), cross(row, seen)))
-            pull = plus(pull, scaled(number(ops, far[k]), cross(row, [ops.constant(float(x)) for x in wanted[k]])))
-        return minus(negative(s), pull), matvec(constant_matrix(ops, filter_gain), s)
+            s = plus(s, scaled(near[k], cross(row, seen)))
+            pull = plus(pull, scaled(far[k], cross(row, [ops.constant(float(x)) for x in wanted[k]])))
+        return minus(negative(s), pull), matvec(filter_gain, s)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         R = np.array(_rotation(rng))
-        return _rotation(rng), (z @ R).tolist()
+        return _rotation(rng), (z @ R).tolist(), *sample_inputs(parameters, rng)
 
     made = OutputFeedback(
         name=name,
@@ -187,6 +206,7 @@ def output_feedback_law(
         inputs=(
             matrix_port(group, "X_hat", "state of the filter"),
             Port("y", z.shape, description="measured directions R' z, one a row"),
+            *input_ports(parameters),
         ),
         outputs=(
             Port("force", (3,), "N m", description="body torque"),
@@ -198,7 +218,7 @@ def output_feedback_law(
         sampler=sampler,
         directions=tuple(tuple(map(float, row)) for row in z),
         targets=tuple(tuple(map(float, row)) for row in wanted),
-        r=tuple(float(each) for each in far),
+        r=tuple(float(each) for each in parameters[0].value or ()),
     )
     return nan_off_group(made, group, ("X_hat",))  # type: ignore[return-value]
 

@@ -24,7 +24,7 @@ _MARGIN = 0.01
 def kept_physical(
     ops: Arithmetic,
     basis: Sequence[sp.ImmutableMatrix],
-    Gamma: sp.ImmutableMatrix,
+    Gamma: Matrix,
     a: Vector,
     drift: Vector,
     start: Sequence[sp.Expr],
@@ -46,7 +46,7 @@ def kept_physical(
     S = [[dot([number(ops, C[i, j]) for C in covariances], a) for j in range(3)] for i in range(3)]
     value, v = least_eigenvector(ops, S)
     slope = [dot(v, matvec(constant_matrix(ops, C), v)) for C in covariances]
-    turned = matvec(constant_matrix(ops, Gamma), slope)
+    turned = matvec(Gamma, slope)
     outward = dot(slope, drift)
     bound = float(least) * _MARGIN
     # From twice the bound on a growing part is taken off, all of it at the bound: a' stays continuous.

@@ -23,7 +23,8 @@ from lie_codegen.groups.maps.guard import kept_where
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, constant_matrix, cross, dot, matvec, minus, negative, number, plus, scaled
+from lie_codegen.kernel.linear import Vector, cross, dot, matvec, minus, negative, number, plus, scaled
+from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, sample_inputs, values_of
 from lie_codegen.on_demand import sympy as sp
 
 _SPINS = ("damped", "free")
@@ -44,7 +45,7 @@ def pointing_law(
     """(y, omega) -> (torque): the body axis b is turned towards the direction y = R^T z that the body sees.
 
     Args:
-        axis: b in body axes, of any length.
+        axis: b in body axes, of any length. Of the numbers behind it each may be "input": an input of that name, behind the others.
         inertia: [kg m^2], for gyroscopic "cancel" and "double".
         k_p: [N m/rad].
         K_d: [N m s/rad], a number, a diagonal or a matrix.
@@ -56,25 +57,43 @@ def pointing_law(
     Raises:
         ShapeError, InputError: an axis that is zero or not three numbers, gains that are not positive, an inertia that is missing.
     """
+    for name_of, direction in (("axis", axis), ("z", z)):
+        refuse_input(direction, name_of, "it is a direction, no gain, and is made a unit vector when the law is made")
     b = _unit(axis, "axis")
     if z is not None:
         _unit(z, "z")
-    p, D = positive_number(k_p, "k_p"), positive_matrix(K_d, 3, "K_d")
     factor = gyroscopic_factor(gyroscopic)
     if spin not in _SPINS:
         raise InputError(f"spin {spin!r} is not known; choose one of {', '.join(_SPINS)}")
     if factor and inertia is None:
         raise InputError(f"gyroscopic {gyroscopic!r} needs the inertia; 'none' does not")
-    metric = None if inertia is None else body_inertia(inertia)
+    gains = (
+        parameter(Port("k_p", (), "N m/rad", description="stiffness"), k_p, positive_number),
+        parameter(
+            Port("K_d", (3, 3), "N m s/rad", description="dissipation, symmetric"),
+            K_d,
+            lambda value, what: positive_matrix(value, 3, what),
+        ),
+    )
+    metric = (
+        parameter(Port("inertia", (3, 3), "kg m^2", description="of the body, symmetric"), inertia, body_inertia)
+        if factor
+        else None
+    )
+    if inertia is not None and not factor:
+        refuse_input(inertia, "inertia", "with gyroscopic 'none' the law uses none")
+        body_inertia(inertia)
+    parameters = (*gains, *([metric] if metric else []))
 
-    def body(ops: Arithmetic, y: Vector, omega: Vector) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, y: Vector, omega: Vector, *given: Any) -> tuple[Any, ...]:
+        p, D, *I = values_of(ops, parameters, given)  # noqa: E741
         target = [number(ops, entry) for entry in b]
         seen = minus(omega, scaled(dot(y, omega), y)) if spin == "free" else omega
-        damping = matvec(constant_matrix(ops, D), seen)
+        damping = matvec(D, seen)
         damping = minus(damping, scaled(dot(y, damping), y)) if spin == "free" else damping
-        torque = plus(scaled(number(ops, -p), cross(y, target)), negative(damping))
-        if metric is not None and factor:
-            torque = plus(torque, scaled(factor, cross(omega, matvec(constant_matrix(ops, metric), omega))))
+        torque = plus(scaled(-p, cross(y, target)), negative(damping))
+        for inertia_matrix in I:
+            torque = plus(torque, scaled(factor, cross(omega, matvec(inertia_matrix, omega))))
         of_unit_length = ops.less(ops.fabs(dot(y, y) - 1), ops.constant(2 * NEAR_GROUP))
         return (kept_where(ops, [of_unit_length], torque),)
 
@@ -84,12 +103,13 @@ def pointing_law(
         inputs=(
             Port("y", (3,), description="measured direction R' z in the body frame, of unit length"),
             Port("omega", (3,), "rad/s", description="body angular velocity"),
+            *input_ports(parameters),
         ),
         outputs=(Port("torque", (3,), "N m", description="body torque tau of I omega' = -omega x I omega + tau"),),
         body=body,
         formula=f"tau = -k_p y x b - K_d omega + {factor} omega x I omega; spin {spin}",
         source="Geyer, The Attitude Control Problem, section 9; Bullo and Murray, CIT-CDS 97-003, Lemma 3.3",
-        sampler=lambda rng: ([row[2] for row in _rotation(rng)], _drawn(rng)),
+        sampler=lambda rng: ([row[2] for row in _rotation(rng)], _drawn(rng), *sample_inputs(parameters, rng)),
     )
 
 

@@ -21,9 +21,9 @@ from typing import Any
 
 from lie_codegen.control.claims import check_claims
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.error_catalogue import as_error, error_names, gain
+from lie_codegen.control.error_catalogue import error_names, gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
-from lie_codegen.control.error_function import ErrorFunction
+from lie_codegen.control.error_inputs import input_parameters
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -71,7 +71,7 @@ def tracking_law(
     Args:
         group: any matrix group.
         inertia: symmetric positive definite on the algebra: a number, a diagonal or an (n, n) matrix; or "input": then it is an
-            input of the kernel by that name, (n, n), behind the others. So may K_d be.
+            input of the kernel by that name, (n, n), behind the others. So may K_d be, and every gain of the error function.
         error: a name ("so3_right", "so3_left", "se3_1" .. "se3_6", "frobenius"), an `ErrorFunction`, or (phi,
         transport)
             as `error_function` takes them, with the parameters among the gains.
@@ -91,7 +91,7 @@ def tracking_law(
     if gains is not None and not isinstance(gains, Mapping):
         raise InputError(f"gains must be a mapping such as {{'K_p': 4, 'K_d': 6}}, got {gains!r}")
     gains = gains or {}
-    pair = as_error(group, error, gains)
+    pair = law_error(group, error, gains)
     shape, K_d = (group.dim, group.dim), gain(gains, "K_d", "a tracking law")
     parameters = (
         parameter(
@@ -106,6 +106,7 @@ def tracking_law(
             lambda value, name: positive_matrix(value, group.dim, name),
             tunable=tunable,
         ),
+        *input_parameters(pair),
     )
     check_compatibility(pair)
     check_claims(pair)
@@ -113,8 +114,9 @@ def tracking_law(
 
     def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any, *given: Any) -> tuple[Any, ...]:
         read = GroupMatrices(ops, real).read
-        metric, K_d = values_of(ops, parameters, given)
-        return _law(ops, pair, real, metric, K_d, feedforward, read(X), xi, read(X_d), xi_d, xi_d_dot)
+        metric, K_d, *rest = values_of(ops, parameters, given)
+        at = ErrorDerivatives(ops, pair, real, read(X), read(X_d), rest)
+        return _law(at, metric, K_d, feedforward, xi, xi_d, xi_d_dot)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         def vector() -> list[float]:
@@ -155,24 +157,19 @@ def _inertia(group: MatrixGroup, inertia: Any) -> sp.ImmutableMatrix:
 
 
 def _law(
-    ops: Arithmetic,
-    pair: ErrorFunction,
-    real: RealMatrices,
+    at: ErrorDerivatives,
     metric: Matrix,
     dissipation: Matrix,
     feedforward: str,
-    X: Any,
     xi: Sequence[Scalar],
-    X_d: Any,
     xi_d: Sequence[Scalar],
     xi_d_dot: Sequence[Scalar],
 ) -> tuple[Any, ...]:
-    at = ErrorDerivatives(ops, pair, real, X, X_d)
     phi, slope = at.differential(1)
     nu, nu_dot, turned = at.transported_rates(xi, xi_d, xi_d_dot)
     xi_e = minus(xi, nu)
     damping = matvec(dissipation, xi_e)
-    forward = feedforward_force(ops, real, metric, feedforward, xi, nu, nu_dot, turned)
+    forward = feedforward_force(at.ops, at.real, metric, feedforward, xi, nu, nu_dot, turned)
     force = plus(negative(slope), negative(damping), forward)
     energy = phi + dot(matvec(metric, xi_e), xi_e) / 2
     return force, phi, energy, -dot(damping, xi_e)

@@ -90,13 +90,11 @@ def _integer_power(base: Scalar, exponent: int) -> Scalar:
     return half * half if exponent % 2 == 0 else half * half * base
 
 
-def expression_body(
-    symbols: Sequence[Sequence[sp.Symbol] | sp.Symbol], outputs: Sequence[Any]
-) -> Callable[..., tuple[Any, ...]]:
+def expression_body(symbols: Sequence[Any], outputs: Sequence[Any]) -> Callable[..., tuple[Any, ...]]:
     """A kernel body from SymPy expressions.
 
     Args:
-        symbols: for each input a symbol (scalar port) or a sequence of symbols (vector port).
+        symbols: for each input a symbol (scalar port), a sequence of symbols (vector port) or a matrix of them (matrix port).
         outputs: for each output an expression, a list of expressions, or a list of rows of them.
     """
 
@@ -105,6 +103,8 @@ def expression_body(
         for names, argument in zip(symbols, arguments, strict=True):
             if isinstance(names, sp.Symbol):
                 values[names] = argument
+            elif isinstance(names, sp.MatrixBase):
+                values.update(zip(names.flat(), (entry for row in argument for entry in row), strict=True))
             else:
                 values.update(zip(names, argument, strict=True))
         evaluate = ExpressionEvaluator(ops, values)

@@ -30,6 +30,7 @@ class Port:
         units: text for the generated documentation, one for the port or one a component.
         is_complex: complex entries; C sees them interleaved (re, im), as numpy's complex128 lies in memory.
         description: one line for the generated documentation.
+        any_sign: of a number of a law that is an input: zero and negative values are allowed too, as of an offset or a coefficient.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Port:
     units: str = ""
     is_complex: bool = False
     description: str = ""
+    any_sign: bool = False
 
     def __post_init__(self) -> None:
         check_identifier(self.name, "port name")

@@ -26,6 +26,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, plus, scaled
+from lie_codegen.kernel.parameter import refuse_input
 from lie_codegen.kernel.structural_zeros import add, product
 from lie_codegen.mechanics.virtual_actuation import virtual_actuation
 
@@ -53,13 +54,20 @@ def vibration_feedback(
         controls: labels of the actuated components; or
         forces: (m, n) covectors.
         k_p, k_d: of eta = -k_p log(X) - k_d xi, in 1/s^2 and 1/s.
-        frequency: w of the slowest oscillation [rad/s].
+        frequency: w of the slowest oscillation [rad/s]. None of these numbers can be "input": the loop must be slow beside the oscillation.
 
     Raises:
         InputError: the loop's rate, max |s| of s^2 + k_d s + k_p = 0, times the period 2 pi / w exceeds .7.
         UncontrollableError: a missing direction or a bad product, in words.
     """
     group = as_group(group, "vibration_feedback")
+    for what, value in (("k_p", k_p), ("k_d", k_d), ("frequency", frequency)):
+        refuse_input(
+            value,
+            f"vibration_feedback: {what}",
+            "that the loop is slow beside the oscillation is checked when the law is made",
+        )
+    refuse_input(inertia, "vibration_feedback: inertia", "the directions of the symmetric products follow from it")
     body_of = virtual_actuation(group, inertia, controls=controls, forces=forces, where="vibration_feedback")
     body_of.require("vibration_feedback")
     stiffness, damping, omega = (

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.definition import doubles, record_factory
+from lie_codegen.kernel.parameter import refuse_input
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,9 @@ def allocate(B: ArrayLike, *, weights: Sequence[float] | None = None, one_sided:
     if matrix.ndim != 2:
         raise ShapeError(f"B has shape {matrix.shape}; give (n, k)")
     n, k = matrix.shape
+    refuse_input(
+        weights, "allocate: weights", "the pseudo-inverse is computed once; make another allocation for other prices"
+    )
     price = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
     if price.shape != (k,) or np.any(price <= 0):
         raise InputError(f"weights must be {k} positive numbers")

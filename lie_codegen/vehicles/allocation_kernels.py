@@ -9,6 +9,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, matvec, minus, plus, scaled
+from lie_codegen.kernel.parameter import input_ports, sample_inputs, values_of
 from lie_codegen.vehicles.allocation import Allocation
 
 
@@ -19,7 +20,7 @@ def allocation_kernel(
     """Thrusts for a wanted body force, and the force that the limits leave undone.
 
     Two-sided: u = W^-1 B' (B W^-1 B')^-1 f. One-sided: the same plus the least multiple of `balance` that makes every
-    thrust positive. Then clipped to the limits; residual = f - B u.
+    thrust positive. Then clipped to the limits, which may be "input"; residual = f - B u.
 
     Raises:
         InputError: a limit that is not positive.
@@ -29,7 +30,7 @@ def allocation_kernel(
     inverse = [[_plain(x) for x in row] for row in allocation.inverse]
     B = [[_plain(x) for x in row] for row in allocation.B]
 
-    def body(ops: Arithmetic, force: Vector) -> tuple[Any, ...]:
+    def body(ops: Arithmetic, force: Vector, *given: Any) -> tuple[Any, ...]:
         u = matvec(inverse, force)
         if allocation.balance is not None:
             lift: Any = 0
@@ -37,13 +38,13 @@ def allocation_kernel(
                 need = -1 * thrust / float(share)
                 lift = ops.where(ops.less(lift, need), need, lift)
             u = plus(u, scaled(lift, [float(share) for share in allocation.balance]))
-        u = saturated(ops, u, bounds)
+        u = saturated(ops, u, *values_of(ops, bounds, given))
         return u, minus(force, matvec(B, u))
 
     return Kernel(
         name=name,
         namespace=namespace,
-        inputs=(Port("force", (n,), description="wanted body force"),),
+        inputs=(Port("force", (n,), description="wanted body force"), *input_ports(bounds)),
         outputs=(
             Port("thrust", (k,), "N", description="one a thruster"),
             Port("residual", (n,), description="what the limits leave undone"),
@@ -51,6 +52,7 @@ def allocation_kernel(
         body=body,
         formula="u = W^-1 B' (B W^-1 B')^-1 f, plus a balance for one-sided thrusters, clipped",
         source="least weighted effort",
+        sampler=lambda rng: ([rng.uniform(-1, 1) for _ in range(n)], *sample_inputs(bounds, rng)),
     )
 
 

@@ -14,10 +14,11 @@ from typing import Any
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number
-from lie_codegen.identifiers import shown
+from lie_codegen.identifiers import check_identifier, shown
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.parameter import Parameter, input_ports, input_symbols, parameter, sample_inputs
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.vehicles.riemannian import coriolis
 
@@ -46,7 +47,7 @@ def manipulator_law(
         K_d: damping, likewise.
         kind: "augmented_pd" or "computed_torque".
         potential: V(q), whose force is cancelled.
-        parameters: numbers by name.
+        parameters: numbers by name. They, K_p and K_d may be "input": an input of that name, behind the others.
         name: C identifier, the namespace too.
 
     Raises:
@@ -59,8 +60,21 @@ def manipulator_law(
         raise InputError(f"manipulator_law: inertia must be a list of rows of formulas, got {shown(inertia)}")
     n = len(inertia)
     q, v, r, w, a = (sp.symbols(f"{letter}1:{n + 1}", real=True) for letter in ("q", "v", "r", "w", "a"))
-    M, V = _read(inertia, potential, q, parameters or {})
-    P, D = positive_matrix(K_p, n, "K_p"), positive_matrix(K_d, n, "K_d")
+    named = {
+        check_identifier(key, "parameter"): parameter(Port(key, (), any_sign=True), value, real_number)
+        for key, value in (parameters or {}).items()
+    }
+    gains = [
+        parameter(
+            Port(key, (n, n), description=f"{what}, symmetric"),
+            value,
+            lambda given, name: positive_matrix(given, n, name),
+        )
+        for key, what, value in (("K_p", "stiffness", K_p), ("K_d", "damping", K_d))
+    ]
+    M, V = _read(inertia, potential, q, {key: _symbolic(each) for key, each in named.items()})
+    P, D = (_symbolic(each) for each in gains)
+    inputs = input_ports([*gains, *named.values()])
     error, velocity = sp.Matrix(q) - sp.Matrix(r), sp.Matrix(v) - sp.Matrix(w)
     C = coriolis(M, q, v)
     gradient = sp.Matrix([sp.diff(V, x) for x in q])
@@ -74,15 +88,24 @@ def manipulator_law(
     return Kernel(
         name=kind,
         namespace=name,
-        inputs=tuple(Port(port, (n,)) for port in ("q", "q_dot", "r", "r_dot", "r_ddot")),
+        inputs=(*(Port(port, (n,)) for port in ("q", "q_dot", "r", "r_dot", "r_ddot")), *inputs),
         outputs=(Port("force", (n,)), Port("W", ()), Port("W_dot", ())),
-        body=expression_body([q, v, r, w, a], outputs),
+        body=expression_body([q, v, r, w, a, *map(input_symbols, inputs)], outputs),
         formula={
             "augmented_pd": "F = M r'' + C r' - K_p (q - r) - K_d (q' - r') + dV",
             "computed_torque": "F = M (r'' - K_p (q - r) - K_d (q' - r')) + C q' + dV",
         }[kind],
         source="Bullo and Murray, CIT-CDS 97-003, (19), (20)",
+        sampler=lambda rng: (
+            *([rng.uniform(-1, 1) for _ in range(n)] for _ in range(5)),
+            *sample_inputs([*gains, *named.values()], rng),
+        ),
     )
+
+
+def _symbolic(each: Parameter) -> Any:
+    """The number, or the symbols that stand for the input."""
+    return input_symbols(each.port) if each.value is None else each.value
 
 
 def _read(
@@ -92,7 +115,7 @@ def _read(
     if any(len(row) != n for row in inertia):
         raise ShapeError(f"the inertia must have {n} rows of {n} entries")
     names = {**{symbol.name: symbol for symbol in q}, "pi": sp.pi}
-    names |= {key: real_number(value, key) for key, value in parameters.items()}
+    names |= parameters
 
     def read(entry: Any) -> sp.Expr:
         if isinstance(entry, str):

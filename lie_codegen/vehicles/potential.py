@@ -12,6 +12,7 @@ from typing import Any
 
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorSymbols, error_function
+from lie_codegen.control.error_inputs import refuse_inputs
 from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import eigenvalues, symmetric_matrix
@@ -34,7 +35,7 @@ class Potential:
         """
         self.group = group
         self.real = RealMatrices(group)
-        self.data = error_function(group, V, parameters=parameters, name="potential")
+        self.data = refuse_inputs(error_function(group, V, parameters=parameters, name="potential"))
         own = {s for prefix in ("X", "Xi") for s in ErrorSymbols(group).matrix(prefix).free_symbols}
         foreign = self.data.phi.free_symbols - own
         if foreign:
