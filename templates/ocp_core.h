@@ -268,11 +268,15 @@ static void add_step_curvature(const real *x, const real *u, const real *p, real
 }
 #endif
 
+#if OCP_NG + OCP_NG_END + OCP_NE > 0
 /* What bounds a multiplier: lambda + rho g where that is positive. */
 static real pressed(real lambda, real rho, real g) { return largest(0, lambda + rho * g); }
+#endif
 
+#if OCP_NG > 0
 /* A path condition on the state alone cannot be changed at the start, where the state is given. */
 static int is_given(int k, int i) { return k == 0 && !needs_control[i]; }
+#endif
 
 /* Cost of the interval k at the nodes of the quadrature; the node in the middle is reached by half a step. */
 static real cost_at(const real *x, const real *u, const real *p, real t)
@@ -918,7 +922,7 @@ int OCP_(solve)(workspace *w, const real *p, ptrdiff_t stride, real t0, real tol
             w->rho = w->rho * 10 < LARGEST_PENALTY ? w->rho * 10 : LARGEST_PENALTY;
         }
         /* at the largest penalty and still no better: a corner between conditions that no small step leaves */
-        stuck = w->violation > last / 2 && w->rho >= LARGEST_PENALTY ? stuck + 1 : 0;
+        stuck = !(w->violation <= allowed) && w->violation > last / 2 && w->rho >= LARGEST_PENALTY ? stuck + 1 : 0;
         if (stuck == 3) {
             break;
         }
@@ -1012,16 +1016,105 @@ real OCP_(plan_cost)(workspace *w, const real *p, ptrdiff_t stride, real t0)
 }
 #endif
 
+#if OCP_FREE
+/* The last state of all is T, how long the plan lasts, in units of which the equations count time. */
+static real within_durations(real T)
+{
+    return T > shortest_duration ? (T < longest_duration ? T : longest_duration) : shortest_duration;
+}
+
+/* Takes a sample off the plan's duration; each stage takes what held in its middle: from further on, so that nothing is lost. */
+static void shift_in_time(workspace *w)
+{
+    const real T = w->x[0][NS - 1], left = within_durations(T - w->sample);
+    int k, j;
+    for (k = 0; k < OCP_N; ++k) {
+        const real middle = (w->sample + ((real)k + (real)0.5) * left / OCP_N) / T * OCP_N;
+        const int from = middle < OCP_N - 1 ? (int)middle : OCP_N - 1;
+        if (from != k) {
+            copy(w->x[k], w->x[from], NS);
+            copy(w->u[k], w->u[from], OCP_M);
+            for (j = 0; j < (OCP_NG > 0 ? OCP_NG : 1); ++j) {
+                w->lambda[k][j] = w->lambda[from][j];
+            }
+        }
+    }
+    for (k = 0; k <= OCP_N; ++k) {
+        w->x[k][NS - 1] = left;
+    }
+}
+
+/* Moves plan and multipliers a sample on; the states follow from where the plan is then. */
+static void shift_plan(const task *s)
+{
+    workspace *w = s->w;
+    real at[NS], next[NS], rest = w->sample / w->x[0][NS - 1];
+    int k;
+    copy(at, w->x[0], NS);
+    for (k = 0; rest > 0 && k < OCP_N; ++k, rest -= OCP_H) {
+        step(at, w->u[k], row(s, k), time_of(s, k), rest < OCP_H ? rest : OCP_H, next);
+        copy(at, next, NS);
+    }
+    shift_in_time(w);
+    copy(w->x[0], at, NS - 1);
+    for (k = 0; k < OCP_N; ++k) {
+        step(w->x[k], w->u[k], row(s, k), time_of(s, k), OCP_H, w->x[k + 1]);
+    }
+}
+
+/* Where the quadratic model P, v of the cost-to-go is least in T, for a first state that is d away from the plan's. */
+static real better_duration(const workspace *w, const real *P, const real *v, const real *d)
+{
+    const real slope = v[NX - 1] + dot(P + (NX - 1) * NX, d, NX - 1), curvature = P[NX * NX - 1], T = w->x[0][NS - 1];
+    return curvature > 0 ? within_durations(T - slope / curvature) - T : 0;
+}
+
+/* The mean of the plan's control over a sample. */
+static void held_control(const workspace *w, real *u)
+{
+    const real length = w->x[0][NS - 1] / OCP_N;
+    real rest = w->sample;
+    int k, i;
+    for (i = 0; i < OCP_M; ++i) {
+        u[i] = 0;
+    }
+    for (k = 0; k < OCP_N; ++k) {
+        const real held = k == OCP_N - 1 || rest < length ? rest : length;
+        for (i = 0; i < OCP_M; ++i) {
+            u[i] += held / w->sample * w->u[k][i];
+        }
+        rest -= held;
+    }
+}
+#else
+static void shift_in_time(workspace *w)
+{
+    memmove(w->x[0], w->x[1], OCP_N * sizeof w->x[0]);
+    memmove(w->u, w->u + 1, (OCP_N - 1) * sizeof w->u[0]);
+}
+
 /* Moves plan and multipliers one interval on; the last control is repeated and the last state rolled out. */
 static void shift_plan(const task *s)
 {
     workspace *w = s->w;
-    memmove(w->x[0], w->x[1], OCP_N * sizeof w->x[0]);
-    memmove(w->u[0], w->u[1], (OCP_N - 1) * sizeof w->u[0]);
+    shift_in_time(w);
 #if OCP_NG > 0
-    memmove(w->lambda[0], w->lambda[1], (OCP_N - 1) * sizeof w->lambda[0]);
+    memmove(w->lambda, w->lambda + 1, (OCP_N - 1) * sizeof w->lambda[0]);
 #endif
     step(w->x[OCP_N - 1], w->u[OCP_N - 1], row(s, OCP_N - 1), time_of(s, OCP_N - 1), OCP_H, w->x[OCP_N]);
+}
+
+static void held_control(const workspace *w, real *u) { copy(u, w->u[0], OCP_M); }
+#endif
+
+/* The measured state as the first of the roll-out; the part `alpha` of the change of a free duration with it. */
+static void place_first(workspace *w, const real *measured, real alpha, real change)
+{
+    copy(w->x_new[0], measured, NS);
+#if OCP_FREE
+    w->x_new[0][NS - 1] = w->x[0][NS - 1] + alpha * change;
+#endif
+    (void)alpha, (void)change;
 }
 
 /* The sample's own step: see the header. */
@@ -1034,8 +1127,15 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
     s.p = p;
     s.stride = stride;
     s.t0 = t0;
-    s.exact = 0;
+    s.exact = OCP_FREE && OCP_SECOND_ORDER; /* Gauss-Newton bends the cost the wrong way in T: -|u|^2 / T for |u|^2 / T */
     w->status = OCP_OK;
+#if OCP_FREE
+    if (!(w->sample > 0) || !is_finite(w->sample)) {
+        copy(u, w->u[0], OCP_M);
+        w->status = OCP_INPUT;
+        return w->status;
+    }
+#endif
     for (i = 0; i < OCP_PACKED; ++i) {
         measured[i] = X[packed_from[i]];
     }
@@ -1045,11 +1145,10 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
     if (!all_finite(measured, NS) || !all_finite(p, numbers) || !is_finite(t0)) {
         /* the plan moves on without its model, whose parameters may be what is not a number */
         if (!w->fresh) {
-            memmove(w->x[0], w->x[1], OCP_N * sizeof w->x[0]);
-            memmove(w->u[0], w->u[1], (OCP_N - 1) * sizeof w->u[0]);
+            shift_in_time(w);
         }
         w->fresh = 0;
-        copy(u, w->u[0], OCP_M);
+        held_control(w, u);
         w->status = OCP_INPUT;
         return w->status;
     }
@@ -1060,14 +1159,17 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
     }
     w->fresh = 0;
     shift = w->shift;
+#if OCP_FREE
+    measured[NS - 1] = w->x[0][NS - 1]; /* nobody measures how long it will take */
+#endif
     for (round = 0; round < iterations; ++round) {
-        real reference, trial = 0, alpha, first[OCP_M];
+        real reference, trial = 0, alpha, change = 0, first[OCP_M];
         int swept = 0, tried, accepted = 0;
         for (tries = 0; tries <= 3 && !swept; ++tries) {
             swept = backward(&s, shift, &gain, &value, P, v);
-            shift = swept ? shift : largest(10 * shift, (real)1e-6);
+            shift = swept || s.exact ? shift : largest(10 * shift, (real)1e-6);
+            s.exact = s.exact && swept;
         }
-        copy(w->x_new[0], measured, NS);
         if (!swept) {
             if (round == 0) {
                 memset(w->K, 0, sizeof w->K);
@@ -1077,6 +1179,12 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
         }
         /* the quadratic model's merit from the measured state; a roll-out that does about as well needs no comparison */
         model_difference(w->x[0], measured, d);
+#if OCP_FREE
+        d[NX - 1] = 0;
+        change = better_duration(w, P, v, d);
+        d[NX - 1] = change;
+#endif
+        place_first(w, measured, 1, change);
         reference = value + OCP_EPSILON * 256 * (1 + (value > 0 ? value : -value));
         for (i = 0; i < NX; ++i) {
             reference += d[i] * (v[i] + dot(P + i * NX, d, NX) / 2);
@@ -1090,21 +1198,26 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
         length = accepted ? 1 : length;
         if (!accepted) {
             const real full = trial;
+            place_first(w, measured, 0, change);
             reference = forward(&s, 0);
             reference += OCP_EPSILON * 256 * (1 + (reference > 0 ? reference : -reference));
             if (is_finite(reference) && !(full <= reference)) {
                 for (alpha = (real)0.5, tried = 1; tried < 4 && !accepted; ++tried, alpha /= 2) {
+                    place_first(w, measured, alpha, change);
                     trial = forward(&s, alpha);
                     accepted = trial <= reference;
                     length = accepted ? alpha : length;
                 }
             } else if (is_finite(full)) {
+                place_first(w, measured, 1, change);
                 trial = forward(&s, 1);
                 accepted = 1;
                 length = 1;
             }
             if (!accepted) {
-                const real held = forward(&s, 0);
+                real held;
+                place_first(w, measured, 0, change);
+                held = forward(&s, 0);
                 if (is_finite(held)) {
                     take_new(w);
                 } else {
@@ -1117,6 +1230,9 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
             }
         }
         take_new(w);
+#if OCP_FREE
+        measured[NS - 1] = w->x[0][NS - 1];
+#endif
         shift = shift * (real)0.3 < (real)1e-5 ? 0 : shift * (real)0.3;
     }
     w->shift = shift;
@@ -1124,8 +1240,9 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
         update_multipliers(&s, length);
         find_violation(&s);
     }
+    held_control(w, u);
     for (i = 0; i < OCP_M; ++i) {
-        const real value_of = w->u[0][i];
+        const real value_of = u[i];
         u[i] = value_of > lower_bound[i] ? (value_of < upper_bound[i] ? value_of : upper_bound[i]) : lower_bound[i];
     }
     return w->status;

@@ -96,6 +96,61 @@ def test_a_trial_that_failed_makes_the_next_step_shorter_and_the_disc_is_kept_ou
     assert jumps < 12
 
 
+def hurried(**options: Any) -> Any:
+    return lc.ocp(
+        "se2", controls=("omega", "vx"), duration=(0.4, 9.0), intervals=20, target="goal", bounds=2.0,
+        **{"stage_cost": "1 + norm2(u)/2", "name": "hurried", **options},
+    )  # fmt: skip
+
+
+def test_a_free_duration_is_chosen_anew_at_every_sample() -> None:
+    """Pushed about, one sweep a sample finds the duration that a whole solution finds."""
+    problem, goal, rng = hurried(), planar(0.8, 2, 1), np.random.default_rng(1)
+    near = problem.solve(goal=goal, starts=6)
+    controller = lc.mpc(problem, sample=0.1)
+    controller.reset(near)
+    X, se2 = np.eye(3), lc.group("se2")
+    for k in range(8):
+        u = controller.step(X, goal=goal)
+        near = problem.solve(X, goal=goal, guess=near)
+        assert controller.status == "ok"
+        assert controller.duration == pytest.approx(near.duration, abs=2e-3)
+        assert controller.duration < near.duration + 0.1 * k
+        times = np.linspace(0, 0.1, 201)[:-1] + 0.00025  # what is handed out is the plan's mean over a sample
+        np.testing.assert_allclose(u, np.mean(controller.plan.u(times), axis=0), atol=5e-3)
+        X = X @ expm(se2.hat([0.1 * u[0], 0.1 * u[1], 0])) @ expm(se2.hat(0.01 * rng.normal(size=3)))
+
+
+def test_the_loop_of_a_free_duration_counts_it_down_to_the_shortest_and_arrives() -> None:
+    controller = lc.mpc(hurried(), sample=0.1)
+    plan = controller.reset(goal=planar(0.8, 2, 1), starts=6)
+    run = controller.simulate(steps=45, values={"goal": planar(0.8, 2, 1)})
+    left = run.states["T"]
+    np.testing.assert_allclose(left[:14], plan.duration - 0.1 * np.arange(14), atol=2e-3)
+    np.testing.assert_allclose(left[15:], 0.4)
+    np.testing.assert_allclose(
+        run.X[-1], planar(0.8, 2, 1), atol=0.02
+    )  # a unicycle cannot move sideways in 0.4 s for nothing
+    assert lc.mpc(hurried()).sample == pytest.approx(0.02)
+    with pytest.raises(InputError, match="formula of t"):
+        lc.mpc(hurried(stage_cost="1 + norm2(u)/2 + 0.01*sin(t)"))
+    for sample in (0, -1, np.nan, "x"):
+        with pytest.raises(InputError, match="sample must be"):
+            lc.mpc(hurried(), sample=sample)
+    with pytest.raises(InputError, match=r"0\.1 s"):
+        lc.mpc(regulator(), sample=0.2)
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_the_package_of_a_free_duration_compiles_strictly_and_its_example_is_content(tmp_path: Path) -> None:
+    controller = lc.mpc(hurried(), sample=0.1)
+    controller.reset(goal=planar(0.8, 2, 1), starts=6)
+    example(package(controller, tmp_path, "double"), "hurried", str(COMPILER))
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "w.sample = 0.1;" in (tmp_path / "package" / "example.c").read_text()
+
+
 @pytest.mark.slow
 def test_twenty_disturbed_seeds() -> None:
     compare(range(20), 100)

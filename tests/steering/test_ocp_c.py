@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from ocp_systems import car, planar, quadrotor, satellite
 
+import lie_codegen as lc
 from lie_codegen.steering.ocp.source import CORE, render_solver, solver_view
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
@@ -75,6 +76,35 @@ def test_the_solver_is_strict_c99_and_clean_under_the_sanitizers(name: str, tmp_
     status, cost, _, _ = run(make(), tmp_path, "double", parameters, *STRICT, *SANITIZERS)
     assert status == "0"
     assert float(cost) == pytest.approx(expected, rel=2e-8)
+
+
+SHAPES: dict[str, dict[str, Any]] = {
+    "bare": {},
+    "one": {"intervals": 1},
+    "path": {"constraints": ("u1 <= 1",)},
+    "end": {"target": "Xd"},
+    "lasting": {"constraints": ("X11 <= 2",)},
+    "free": {"duration": (0.2, 3.0), "target": "Xd"},
+}
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("plans", [True, False])
+def test_problems_of_every_shape_are_strict_c99(shape: str, plans: bool, tmp_path: Path) -> None:
+    """With and without conditions on the way and at the end: what one of them needs, another has no use for."""
+    options: dict[str, Any] = {
+        "duration": 1.0,
+        "intervals": 5,
+        "parameters": {"Xd": "X"},
+        "name": "shape",
+        **SHAPES[shape],
+    }
+    problem = lc.ocp("so3", controls=("w1", "w2"), stage_cost=("3*(X - Xd)", "u"), **options)
+    view, _ = solver_view(problem.data, second_order=False, plans=plans)
+    for path, text in render_solver(view).items():
+        (tmp_path / path).write_text(text)
+    subprocess.run([str(COMPILER), *STRICT, "-O1", "-c", "shape.c"], cwd=tmp_path, check=True, capture_output=True)
 
 
 @pytest.mark.slow

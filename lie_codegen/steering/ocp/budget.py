@@ -38,6 +38,11 @@ def budget_of(view: SolverView, iterations: int) -> Budget:
     inner = sum(1 for c in view.node_c if float(c.strip("()f")) not in (0.0, 1.0))
     chain = s * (count["model_stage_jacobian"] + 2 * nx * nx * nv + 4 * nx * nv)
     chain += count["model_move"] + count["model_move_jacobian"] + 2 * view.dim * view.dim * nv
+    if view.second_order:
+        chain += (
+            s * (count["model_stage_hessian"] + 2 * nc * nv * (nc + nv) + 2 * nx * nx) + count["model_move_hessian"]
+        )
+        chain += 4 * view.dim * nv * (nv + view.dim) + count["model_cost_exact"] + count.get("model_path_hessian", 0)
     pulled = 2 * (2 * nv**3) + 2 * nv * nv
     stage = (1 + inner) * (chain + pulled) + len(view.node_c) * (count["model_cost_square"] + 2 * nv * nv)
     stage += count.get("model_path_jacobian", 0) + view.path * (2 * nv * nv + 2 * nv)
@@ -49,7 +54,8 @@ def budget_of(view: SolverView, iterations: int) -> Budget:
     roll = step * (1 + inner) + count["model_difference"] + len(view.node_c) * count["model_cost"]
     roll += count.get("model_path", 0) + 6 * view.path + m * (2 * nx + 4)
     rollout = N * roll + count["model_end_cost"] + count.get("model_end", 0)
-    after = 2 * N * count.get("model_path", 0) + step
+    shifts = 2 * N * step if view.durations else step
+    after = 2 * N * count.get("model_path", 0) + shifts
     size = 4 if view.real == "float" else 8
     arrays = 4 * nv * nv + 2 * nv + nx * nv + nx * nx  # Q, W, H and the pulled-back block; gradients; J; P
     arrays += (

@@ -29,7 +29,7 @@ class LoopRun:
     Attributes:
         t: (k + 1,) times.
         X: (k + 1, d, d) true elements.
-        z: (k + 1, q) true other states; `states` has them by name.
+        z: (k + 1, q) true other states; `states` has them by name; T of a free duration is what the plan leaves of it.
         u: (k, m) controls that acted.
         status: (k,) what the controller said at each sample.
         violation: (k,) of the controller's plan.
@@ -103,13 +103,15 @@ def run_loop(
         if operator.index(number) < least:
             raise InputError(f"{where}: {what} must be a whole number of at least {least}, got {number!r}")
     rng = np.random.default_rng(seed)
-    machine, h = loop_machine(data), data.duration / data.intervals
+    machine, h, free = loop_machine(data), controller.sample, data.free_duration is not None
     told = {name: value for name, value in values.items() if name in data.parameters.names}
     first = {name: values.get(name, np.zeros(shape)) for name, shape in data.states.shapes}
     unknown = [name for name in values if name not in told and name not in first]
     if unknown:
         raise InputError(f"{where}: no state or parameter {', '.join(unknown)}")
     X = group_element(data.group, np.eye(data.group.degree) if X0 is None else X0, f"{where}: X0")
+    if free:
+        first["T"] = 1.0  # the plant's own time is counted in seconds
     x = np.concatenate([pack_element(data, X), data.states.rows(first, 1, where)[0]])
     move = _plant(data, plant, plant_values, told, controller, substeps, rng, where)
     disturb = _noise(data, noise, rng, where)
@@ -121,14 +123,15 @@ def run_loop(
         believed = _row(data, controller, now)
         measured = disturb(x)
         for i, u in enumerate(pending if compensate else ()):
-            measured = machine.advance(measured, u, believed, (k + i) * h, h, 1)
+            measured = machine.advance(measured, u, believed, 0.0 if free else (k + i) * h, h, 1)
         element, z = unpack_elements(data, measured[None])
         began = time.perf_counter()
-        u = controller.step(element[0], t=(k + len(pending)) * h, **data.states.split(z[0]), **now)
+        states = {name: value for name, value in data.states.split(z[0]).items() if name != "T" or not free}
+        u = controller.step(element[0], t=(k + len(pending)) * h, **states, **now)
         record["seconds"].append(time.perf_counter() - began)
         pending.append(u)
         acting = pending.pop(0)
-        record["x"].append(x)
+        record["x"].append(np.append(x[:-1], controller.duration) if free else x)
         record["u"].append(acting)
         record["status"].append(controller.status)
         record["violation"].append(controller.violation)
@@ -136,7 +139,8 @@ def run_loop(
         x = move(k, x, acting)
         after = machine.running_cost(x, acting, believed, (k + 1) * h)
         record["cost"].append(h * before if data.quadrature == "left" else h * (before + after) / 2)
-    elements, rest = unpack_elements(data, np.array([*record["x"], x]))
+    last = np.append(x[:-1], controller.duration) if free else x
+    elements, rest = unpack_elements(data, np.array([*record["x"], last]))
     return LoopRun(
         t=h * np.arange(len(elements)),
         X=elements,
@@ -171,12 +175,15 @@ def _plant(
     rng: np.random.Generator,
     where: str,
 ) -> Callable[[int, Array, Array], Array]:
-    h = data.duration / data.intervals
+    h, free = controller.sample, data.free_duration is not None
     if plant is None or isinstance(plant, OptimalControlProblem):
         true = controller.problem.data if plant is None else plant.data
         same = (true.group, true.states, true.inputs) == (data.group, data.states, data.inputs)
+        same = same and (true.free_duration is None) == (data.free_duration is None)
         if not same:
-            raise InputError(f"{where}: the plant {true.name} has another group, other states or other inputs")
+            raise InputError(
+                f"{where}: the plant {true.name} has another group, other states or inputs, or another kind of duration"
+            )
         machine = loop_machine(true)
         known = dict(true.parameters.shapes)
         start = data.parameters.split(controller.parameters_now())
@@ -185,7 +192,7 @@ def _plant(
         def move(k: int, x: Array, u: Array) -> Array:
             now = {name: _at(value, k, rng, name in plant_values) for name, value in constant.items()}
             row = true.parameters.rows(now, 1, where)[0]
-            return machine.advance(x, u, row, k * h, h, substeps)
+            return machine.advance(x, u, row, 0.0 if free else k * h, h, substeps)
 
         return move
     if not callable(plant):

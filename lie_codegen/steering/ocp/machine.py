@@ -102,9 +102,10 @@ def machine_of(data: ProblemData, *, second_order: bool) -> Machine:
 
 
 def loop_machine(data: ProblemData) -> Machine:
-    """A solver for a loop: the one that plans, if it is there already, else one without second order, which builds faster."""
+    """A solver for a loop: the one that plans, if it is there already or the duration is free; else one without second order, which
+    builds faster."""
     planned = _BUILT.get((id(data), True))
-    second_order = planned is not None and planned[0] is data
+    second_order = data.free_duration is not None or (planned is not None and planned[0] is data)
     return machine_of(data, second_order=second_order)
 
 

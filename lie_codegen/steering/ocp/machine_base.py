@@ -87,6 +87,7 @@ def workspace_type(intervals: int, sizes: Sizes) -> np.dtype[Any]:
         ("cost", float),
         ("violation", float),
         ("shift", float),
+        ("sample", float),
     ]
     counts = ("worst", "worst_stage", "iterations", "sweeps", "curvature", "fresh", "status", "stop")
     return np.dtype([*numbers, *[(name, np.intc) for name in counts]], align=True)

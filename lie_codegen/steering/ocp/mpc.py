@@ -18,6 +18,8 @@ from lie_codegen.steering.ocp.machine import CompiledMachine, loop_machine
 from lie_codegen.steering.ocp.machine_base import HELD, INPUT, OK
 from lie_codegen.steering.ocp.plan import OptimalPlan
 from lie_codegen.steering.ocp.problem import OptimalControlProblem
+from lie_codegen.steering.ocp.problem_data import ProblemData
+from lie_codegen.steering.ocp.terms import name_of
 
 if TYPE_CHECKING:
     from lie_codegen.steering.ocp.machine_base import Machine
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
 _STATUS = {OK: "ok", HELD: "held", INPUT: "input"}
 
 
-def mpc(problem: OptimalControlProblem, *, iterations: int = 1, penalty: float = 300.0) -> ModelPredictiveControl:
+def mpc(
+    problem: OptimalControlProblem, *, iterations: int = 1, penalty: float = 300.0, sample: float | None = None
+) -> ModelPredictiveControl:
     """A controller that solves `problem` anew at every sample, from the solution of the last one.
 
     Each step moves controls, states and multipliers on by one interval, sets the first state to the measurement, and takes
@@ -33,41 +37,63 @@ def mpc(problem: OptimalControlProblem, *, iterations: int = 1, penalty: float =
     follow with a constant penalty. A control outside its bounds never leaves it.
 
     Args:
-        problem: from `lc.ocp`; a sample is one of its intervals.
+        problem: from `lc.ocp`; a sample is one of its intervals. Where its duration is free, what is left of it is chosen anew at every
+            sample, down to the shortest; then the horizon keeps that length.
         iterations: sweeps a sample; one is enough where samples are short (real-time iteration).
         penalty: rho of the conditions.
+        sample: seconds between two steps of a problem of free duration; its shortest interval if not given.
 
     Raises:
-        InputError: iterations below 1, a penalty that is not positive, or no problem.
+        InputError: iterations below 1, a penalty that is not positive, no problem; a sample that is none, or a formula of t, which
+            cannot tell where a free duration began.
     """
     if not isinstance(problem, OptimalControlProblem):
         raise InputError(f"mpc: expected a problem of lc.ocp, got {problem!r:.60}")
-    if problem.data.free_duration is not None:
-        raise InputError(f"mpc({problem.data.name}): a loop has a horizon of constant length; give lc.ocp one duration")
     if isinstance(iterations, bool) or not isinstance(iterations, int | np.integer) or not 1 <= iterations <= 1000:
         raise InputError(
             f"mpc({problem.data.name}): iterations must be a whole number from 1 to 1000, got {iterations!r}"
         )
     if not (isinstance(penalty, int | float | np.number) and 0 < penalty < np.inf):
         raise InputError(f"mpc({problem.data.name}): penalty must be a positive number, got {penalty!r}")
-    return ModelPredictiveControl(problem, int(iterations), float(penalty))
+    return ModelPredictiveControl(problem, int(iterations), float(penalty), _sample(problem.data, sample))
+
+
+def _sample(data: ProblemData, sample: float | None) -> float:
+    """Seconds between two steps."""
+    where = f"mpc({data.name})"
+    interval = (data.duration if data.free_duration is None else data.free_duration[0]) / data.intervals
+    if sample is None:
+        seconds = interval
+    elif not (isinstance(sample, int | float | np.number) and 0 < sample < np.inf):
+        raise InputError(f"{where}: sample must be a positive number of seconds, got {sample!r}")
+    elif data.free_duration is None and not np.isclose(sample, interval, rtol=1e-9):
+        raise InputError(
+            f"{where}: a sample is an interval of the problem, {interval:g} s; give lc.ocp other intervals"
+        )
+    else:
+        seconds = float(sample)
+    if data.free_duration is not None and (timed := [term for term in data.terms if "t" in data.scope.uses(term)]):
+        raise InputError(f"{where}: {name_of(timed[0])} is a formula of t; with a free duration give it a parameter")
+    return seconds
 
 
 class ModelPredictiveControl:
     """The controller. One object is one loop: give each thread its own.
 
     Attributes:
-        problem, iterations, penalty: what it was made of.
+        problem, iterations, penalty, sample: what it was made of.
         status: of the last step: "ok"; "held" (no trial did better: the plan's own control, fed back); "input" (a number
             that is none was given: the plan's own control); "reset" before the first step.
     """
 
-    def __init__(self, problem: OptimalControlProblem, iterations: int, penalty: float) -> None:
+    def __init__(self, problem: OptimalControlProblem, iterations: int, penalty: float, sample: float) -> None:
         data = problem.data
         self.problem = problem
         self.iterations = iterations
         self.penalty = penalty
+        self.sample = sample
         self.status = "not reset"
+        self._is_free = data.free_duration is not None
         self._started: OptimalPlan | None = None
         self._machine: Machine = loop_machine(data)
         self._space = self._machine.workspace()
@@ -79,10 +105,11 @@ class ModelPredictiveControl:
         self._rows = self._records.view(float).reshape(data.intervals + 1, -1)
         self._good = self._rows.copy()
         self._states = {
-            name: (self._z[place].reshape(shape), shape) for name, (place, shape) in data.states.slices().items()
+            name: (self._z[place].reshape(shape), shape)
+            for name, (place, shape) in data.states.slices().items()
+            if name != "T" or not self._is_free
         }
         self._parameters = {name: (self._records[name], shape[:2]) for name, shape in data.parameters.shapes}
-        self._h = data.duration / data.intervals
         self._t = 0.0
         self._call = self._bound_call()
 
@@ -108,7 +135,7 @@ class ModelPredictiveControl:
         space["u"], space["K"] = plan.u, plan.gain
         space["lambda"], space["lambda_end"] = plan.multipliers, plan.end_multipliers
         space["rho"], space["fresh"], space["curvature"] = self.penalty, 1, 0
-        space["violation"], space["worst"] = plan.violation, -1
+        space["violation"], space["worst"], space["sample"] = plan.violation, -1, self.sample
         if plan.parameters.shape[1]:
             self._rows[...] = plan.parameters
         self._good[...] = self._rows
@@ -123,7 +150,7 @@ class ModelPredictiveControl:
         Args:
             X: (d, d) measured element; the identity if not given. Numbers that are none are met with the plan's own
                 control and status "input".
-            t: time of the sample; one interval after the last if not given.
+            t: time of the sample; one sample after the last if not given.
             **values: every state by name, and the parameters that changed, constant or with a row a stage.
 
         Raises:
@@ -153,8 +180,8 @@ class ModelPredictiveControl:
             raise InputError(f"{self._where()}: no value for the state {', '.join(missing)}")
         if t is not None:
             self._t = float(t)
-        status = self._call(self._t)
-        self._t += self._h
+        status = self._call(0.0 if self._is_free else self._t)
+        self._t += self.sample
         self.status = _STATUS[status]
         if changed:
             # what was no number is not kept for the next sample
@@ -174,11 +201,16 @@ class ModelPredictiveControl:
         return np.array(self._rows[0, : self.problem.data.parameters.size])
 
     @property
+    def duration(self) -> float:
+        """Seconds of the plan as it stands: what is left of a free duration."""
+        return float(self._space["x"][0, 0, -1]) if self._is_free else self.problem.data.duration
+
+    @property
     def plan(self) -> OptimalPlan:
         """The plan as it stands, from the last measurement on; its gains are those of the last sweep (Gauss-Newton)."""
         space = self._space.copy()
         rows = self._rows if self.problem.data.parameters.size else np.zeros((1, 0))
-        started = self._t - self._h
+        started = 0.0 if self._is_free else self._t - self.sample
         space["cost"] = self._machine.plan_cost(space, rows, started)
         admissible = self.violation <= 1e-8
         space["status"] = 1 if admissible else 2
@@ -211,7 +243,7 @@ class ModelPredictiveControl:
         """
         if (steps is None) == (duration is None):
             raise InputError(f"closed loop of {self.problem.data.name}: give steps or a duration")
-        count = steps if steps is not None else max(1, round(float(duration or 0.0) / self._h))
+        count = steps if steps is not None else max(1, round(float(duration or 0.0) / self.sample))
 
         def run(number: int) -> LoopRun:
             return run_loop(
@@ -234,13 +266,15 @@ class ModelPredictiveControl:
             raise InputError(
                 f"generate: reset the mpc of {self.problem.data.name} with a plan first: its example needs one"
             )
-        return render_mpc_package(self._started, iterations=self.iterations, penalty=self.penalty, real=real)
+        return render_mpc_package(
+            self._started, iterations=self.iterations, penalty=self.penalty, sample=self.sample, real=real
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy in another process is made anew, and put where this one stands."""
         return {
             "problem": self.problem,
-            "settings": (self.iterations, self.penalty),
+            "settings": (self.iterations, self.penalty, self.sample),
             "space": self._space.copy(),
             "rows": self._rows.copy(),
             "t": self._t,

@@ -36,7 +36,9 @@ class SampleVector:
     u: tuple[float, ...]
 
 
-def render_mpc_package(plan: OptimalPlan, *, iterations: int, penalty: float, real: str = "double") -> dict[str, str]:
+def render_mpc_package(
+    plan: OptimalPlan, *, iterations: int, penalty: float, sample: float, real: str = "double"
+) -> dict[str, str]:
     """The package of a loop that starts from `plan`.
 
     Raises:
@@ -45,8 +47,8 @@ def render_mpc_package(plan: OptimalPlan, *, iterations: int, penalty: float, re
     if real not in REALS:
         raise CodegenError(f"real is one of {', '.join(REALS)}, given {real!r}")
     data = plan.problem
-    view, model = solver_view(data, second_order=False, real=real)
-    vectors = make_vectors(plan, InterpretedMachine(data, model), iterations, penalty)
+    view, model = solver_view(data, second_order=data.free_duration is not None, real=real)
+    vectors = make_vectors(plan, InterpretedMachine(data, model), iterations, penalty, sample)
     sources = render_solver(view)
     budget = budget_of(view, iterations)
     literal = REALS[real].literal
@@ -60,6 +62,7 @@ def render_mpc_package(plan: OptimalPlan, *, iterations: int, penalty: float, re
         "multipliers": [[literal(x) for x in row] for row in plan.multipliers],
         "end_multipliers": [literal(x) for x in plan.end_multipliers],
         "penalty": literal(penalty),
+        "sample": literal(sample),
         "iterations": iterations,
         "tolerance": repr(_TOLERANCES[real]),
         "zero": literal(0.0),
@@ -78,29 +81,33 @@ def render_mpc_package(plan: OptimalPlan, *, iterations: int, penalty: float, re
 
 
 def make_vectors(
-    plan: OptimalPlan, machine: InterpretedMachine, iterations: int, penalty: float
+    plan: OptimalPlan, machine: InterpretedMachine, iterations: int, penalty: float, sample: float
 ) -> tuple[SampleVector, ...]:
     """Samples along the plan with a little noise, seeded, and the controls by the numpy solver."""
     data, rng = plan.problem, np.random.default_rng(0)
     space = machine.workspace()
     rows, h = np.ascontiguousarray(plan.parameters), data.duration / data.intervals
     space["x"][0, 0] = np.concatenate([pack_element(data, plan.X[0]), plan.z[0]])
-    space["u"][0], space["rho"], space["fresh"] = plan.u, penalty, 1
+    space["u"][0], space["rho"], space["fresh"], space["sample"] = plan.u, penalty, 1, sample
     space["lambda"][0], space["lambda_end"][0] = plan.multipliers, plan.end_multipliers
     run = Run(space[0], rows, 0.0)
     for k in range(data.intervals):
         last = (space["x"][0, k], space["u"][0, k], run.row(k), k * h)
         space["x"][0, k + 1] = machine.model.step(*last, h)
+    free = data.free_duration is not None
     x, vectors = np.array(space["x"][0, 0]), []
+    if free:
+        x[-1] = 1.0  # the plant's own time is counted in seconds
     for k in range(min(_SAMPLES, data.intervals)):
         X, z = unpack_elements(data, x[None])
         element = X[0] @ scipy.linalg.expm(data.group.hat(_NOISE * rng.normal(size=data.group.dim)))
         states = z[0] + _NOISE * rng.normal(size=len(z[0]))
         u = np.zeros(data.inputs.size)
-        machine.step(space, element, states, rows, k * h, iterations, u)
+        time = 0.0 if free else k * h
+        machine.step(space, element, states, rows, time, iterations, u)
         flat = element.astype(complex).ravel().view(float) if data.group.is_complex else element.ravel()
         vectors.append(SampleVector(tuple(map(float, flat)), tuple(map(float, states)), tuple(map(float, u))))
-        x = machine.advance(x, u, run.row(k), k * h, h, 1)
+        x = machine.advance(x, u, run.row(k), time, sample, 1)
     return tuple(vectors)
 
 

@@ -123,6 +123,16 @@ class ProblemData:
         return self.scope.without_inputs()
 
     @property
+    def terms(self) -> tuple[Term, ...]:
+        """Every formula and kernel."""
+        law = self.velocity
+        own = law if isinstance(law, tuple) else law.force if isinstance(law, SecondOrder) else ()
+        rates = (term for _, terms in self.rates for term in terms)
+        costs = (each.term for each in (*self.stage_cost, *self.terminal_cost))
+        conditions = (each.term for each in (*self.constraints, *self.terminal))
+        return (*own, *rates, *costs, *conditions)
+
+    @property
     def is_invariant(self) -> bool:
         """xi depends on the controls alone, and there are no other states: a step is one exponential, exactly."""
         return isinstance(self.velocity, Affine) and not self.states.shapes

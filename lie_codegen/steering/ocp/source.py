@@ -54,6 +54,7 @@ class SolverView:
     upper: tuple[str, ...]
     packed_from: tuple[int, ...]
     needs_control: tuple[int, ...]
+    durations: tuple[str, ...]
     kernels: tuple[KernelView, ...]
 
 
@@ -114,6 +115,7 @@ def solver_view(
             parts * (group.degree * i + j) + part for i, j in varying_entries(group) for part in range(parts)
         ),
         needs_control=tuple(map(int, model.needs_control)) or (0,),
+        durations=literals(data.free_duration or ()),
         kernels=tuple(_kernel(function, target) for function in model.functions),
     )
     return view, model
@@ -147,7 +149,7 @@ def workspace_bytes(data: ProblemData, model: Model, real: str) -> int:
     s, N = model.sizes, data.intervals
     stored, nx, m = s.packed + s.q, s.nx, s.m
     numbers = 2 * ((N + 1) * stored + N * m) + N * m * nx + N * m + N * max(1, s.path)
-    numbers += max(1, s.end_path + s.end) + nx * nx + nx + 4
+    numbers += max(1, s.end_path + s.end) + nx * nx + nx + 5
     size = 8 if real == "double" else 4
     return -(-(numbers * size + 8 * 4) // size) * size
 
