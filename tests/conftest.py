@@ -1,4 +1,7 @@
-"""One cache of compiled libraries for the whole run, shared by all workers and thrown away at the end."""
+"""One cache of compiled libraries for the whole run, shared by all workers and thrown away at the end.
+
+Libraries are compiled with -Og, in half the time and to the same numbers; `LIE_CODEGEN_CFLAGS= python -m pytest` tests what users get, as `.ci/slow` does.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         config.lie_codegen_cache = tempfile.mkdtemp(prefix="lie-codegen-tests-")
         os.environ["LIE_CODEGEN_CACHE"] = config.lie_codegen_cache
+        os.environ.setdefault("LIE_CODEGEN_CFLAGS", "-Og")
         os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 

@@ -1,7 +1,7 @@
 """Finding a C compiler and turning C text into a shared library.
 
 The ladder: $LIE_CODEGEN_CC, $CC, cc, gcc, clang, then `python -m ziglang cc` if that wheel is installed.
-LIE_CODEGEN_CC=none stops the search. Microsoft's compiler is out of scope: its command line is
+LIE_CODEGEN_CC=none stops the search; $LIE_CODEGEN_CFLAGS are flags after ours. Microsoft's compiler is out of scope: its command line is
 another; on Windows install the zig extra.
 """
 
@@ -59,12 +59,14 @@ class Compiler:
 
     Attributes:
         command: program and leading arguments.
-        identity: the command, the program's real path, its size and time of change; changes when the
+        identity: the command, the program's real path, its size and time of change, the further flags; changes when the
             compiler is upgraded, and costs no process to find out.
+        further: flags after ours, from $LIE_CODEGEN_CFLAGS.
     """
 
     command: tuple[str, ...]
     identity: str
+    further: tuple[str, ...] = ()
 
 
 def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compiler, ...]:
@@ -73,7 +75,7 @@ def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compil
     if variables.get("LIE_CODEGEN_CC", "").strip().lower() == "none":
         return ()
     found: dict[str, Compiler] = {}
-    asked = _asked(variables)
+    asked, further = _asked(variables), _words(variables, "LIE_CODEGEN_CFLAGS")
     for command in _ladder(variables):
         program = shutil.which(command[0], path=variables.get("PATH", ""))
         if program is None:
@@ -82,7 +84,8 @@ def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compil
             continue
         extra = command[1:] if command[1:2] != ("-m",) else ()
         real = _zig_program() if command[1:2] == ("-m",) else os.path.realpath(program)
-        found.setdefault(" ".join((real, *extra)), Compiler((program, *command[1:]), _identity(command, real)))
+        identity = _identity((*command, *further), real)
+        found.setdefault(" ".join((real, *extra)), Compiler((program, *command[1:]), identity, further))
     return tuple(found.values())
 
 
@@ -122,7 +125,7 @@ def compile_library(compiler: Compiler, folder: Path, main: str, output: str, fl
         attempts.append(tuple(flag for flag in flags if flag != NATIVE))
     failures = []
     for attempt in attempts:
-        command = (*compiler.command, *attempt, "-o", output, main, "-lm")
+        command = (*compiler.command, *attempt, *compiler.further, "-o", output, main, "-lm")
         status, printed = _run(command, folder)
         if status == 0 and (folder / output).is_file():
             return
@@ -194,15 +197,16 @@ def is_working(compiler: Compiler, folder: Path) -> bool:
 
 def _asked(variables: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
     """The commands that the user asks for."""
-    found = []
-    for name in ("LIE_CODEGEN_CC", "CC"):
-        try:
-            words = tuple(shlex.split(variables.get(name, "")))
-        except ValueError:
-            words = ()
-        if words:
-            found.append(words)
-    return tuple(found)
+    commands = (_words(variables, name) for name in ("LIE_CODEGEN_CC", "CC"))
+    return tuple(words for words in commands if words)
+
+
+def _words(variables: Mapping[str, str], name: str) -> tuple[str, ...]:
+    """A variable as a shell would split it; nothing where its quotes do not close."""
+    try:
+        return tuple(shlex.split(variables.get(name, "")))
+    except ValueError:
+        return ()
 
 
 def _ladder(variables: Mapping[str, str]) -> Iterator[tuple[str, ...]]:

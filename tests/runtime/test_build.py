@@ -331,6 +331,21 @@ def test_the_ladder(tmp_path: Path) -> None:
     assert find_compilers({"PATH": path})[0].identity != first[0].identity
 
 
+def test_further_flags_come_last_and_make_another_entry(monkeypatch: pytest.MonkeyPatch, compiles: list[str]) -> None:
+    monkeypatch.setenv("LIE_CODEGEN_CFLAGS", "-O1 '-DA B'")
+    compiler = find_compilers()[0]
+    assert compiler.further == ("-O1", "-DA B")
+    monkeypatch.setenv("LIE_CODEGEN_CFLAGS", "-O0 -DNDEBUG")
+    assert find_compilers()[0].identity != compiler.identity
+    build_kernels(lambda: toy_kernels.KERNELS)
+    assert compiles, "a library of other flags is another"
+    monkeypatch.setenv("LIE_CODEGEN_CFLAGS", "-fno-such-flag")
+    with pytest.raises(CompileError, match="-fno-such-flag"):
+        build_kernels(lambda: toy_kernels.KERNELS)
+    monkeypatch.setenv("LIE_CODEGEN_CFLAGS", "'not closed")
+    assert find_compilers()[0].further == ()
+
+
 def test_without_a_compiler_it_is_interpreted_after_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = build_kernels(lambda: toy_kernels.KERNELS)
     monkeypatch.setenv("LIE_CODEGEN_CC", "none")
