@@ -291,3 +291,16 @@ def test_the_core_is_clean_c99_with_lanes_and_without(flags: tuple[str, ...], tm
     command = (compiler, *strict, *flags, f"-I{tmp_path}", str(core), "-o", str(tmp_path / "core.o"))
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_valleys_of_whole_turns_are_found_by_steady_starts() -> None:
+    """Targets of steady controls with noise: the plan is no dearer than the controls that made the target."""
+    se3, rng = lc.group("se3"), np.random.default_rng([1, 316])
+    for _ in range(6):
+        mean = rng.uniform(-1, 1, 3)
+        u = np.clip(mean + rng.uniform(-1, 1, (20, 3)), -1, 1)
+        X = np.eye(4)
+        for row in u:
+            X = X @ expm(se3.hat(0.25 * np.array([*row, 1, 0, 0])))
+        plan = lc.steer(se3, X, ("w1", "w2", "w3"), 5.0, drift=(0, 0, 0, 1, 0, 0), bounds=1)
+        assert plan.cost <= 0.25 * np.sum(u**2) * (1 + 1e-6)

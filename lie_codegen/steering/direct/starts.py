@@ -1,4 +1,4 @@
-"""First controls for the search: none, white noise, and smooth waves; the same for the same seed."""
+"""First controls for the search: none, white noise, smooth waves, and nearly constant ones; the same for the same seed."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from lie_codegen.steering.direct.assemble import Manoeuvre
 #: Sizes of the waves, in units of the bounds: larger ones start at the bounds and stay there (measured on two-qubit gates).
 _SIZES = (0.3, 0.15, 0.6, 0.1)
 _WAVES = 4
+#: White noise on steady controls, which may be as large as the bounds.
+_UNSTEADY = 0.2
 
 
 def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> Array:
-    """(lanes, pieces, m): white, both, white, smooth in turn; the very first is zero, moved into the bounds."""
+    """(lanes, pieces, m): white, smooth, white, nearly constant in turn; the very first is zero, moved into the bounds."""
     rng = np.random.default_rng([seed, round_])
     middle, half = _box(task)
     s = (np.arange(pieces) + 0.5) / pieces
@@ -27,11 +29,14 @@ def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> 
         # a motion to one side needs a mean: it is drawn apart from the wave
         mean = rng.uniform(-1, 1, task.controls)
         # white noise arrives where smooth waves stall at the bounds (gates in short time), and the other way round (one in four)
-        kind = (white, white + 0.3 * (smooth + mean), white, smooth + mean)[lane % 4]
+        kind = (white, white + 0.3 * (smooth + mean), white)
         if lane == 0 and round_ == 0:
             found.append(np.zeros((pieces, task.controls)))
+        elif lane % 4 == 3:
+            # each whole turn that steady controls make is a valley of its own (rigid motions: costs up to twice as high without these)
+            found.append(middle + half * (mean + _UNSTEADY * white))
         else:
-            found.append(middle + size * half * kind)
+            found.append(middle + size * half * kind[lane % 4])
     return np.clip(np.array(found), task.low, task.high)
 
 
