@@ -274,7 +274,7 @@ class OnGroup(Distribution):
 
     Attributes:
         group: the group, its name or its file.
-        spread: None for Haar's measure (SO(n) and SU(n) as d x d matrices); otherwise X = mean exp(hat xi), xi ~ N(0, spread^2):
+        spread: None for Haar's measure, of a compact group; otherwise X = mean exp(hat xi), xi ~ N(0, spread^2):
             a number, (n,) standard deviations, or an (n, n) covariance.
         mean: (d, d) element, the identity if not given.
     """
@@ -288,10 +288,10 @@ class OnGroup(Distribution):
         mean = np.eye(group.degree) if self.mean is None else admitted(group, self.mean, "OnGroup: mean").X
         spread = None
         if self.spread is None:
-            if _compact_kind(group) is None:
+            if not _is_compact(group):
                 raise InputError(
-                    f"OnGroup: {group.name} is neither SO(n) nor SU(n) in n x n matrices, whose Haar measure is drawn here; give "
-                    "spread=, the standard deviation of xi in mean exp(hat xi)"
+                    f"OnGroup: {group.name} is not compact, so its Haar measure is no distribution; give spread=, the standard "
+                    "deviation of xi in mean exp(hat xi)"
                 )
         else:
             spread = _spread(group, self.spread)
@@ -299,11 +299,14 @@ class OnGroup(Distribution):
 
     @property
     def slots(self) -> int:
-        """n for a spread; for Haar's measure as many as a Gaussian matrix has numbers."""
+        """n for a spread; for Haar's measure as many as a Gaussian matrix has numbers, or n for each of the factors of `_walk`."""
         group = self._group
         if self.spread is not None:
             return group.dim
-        return group.degree**2 * (2 if _compact_kind(group) == "su" else 1)
+        kind = _compact_kind(group)
+        if kind is None:
+            return _FACTORS * group.dim
+        return group.degree**2 * (2 if kind == "su" else 1)
 
     @property
     def _group(self) -> MatrixGroup:
@@ -315,12 +318,11 @@ class OnGroup(Distribution):
         z = _quantile(uniform)
         if self.spread is not None:
             return np.asarray(self.mean @ expm(group.hat(z @ _factor("OnGroup: spread", self.spread).T)))
-        d = group.degree
-        if _compact_kind(group) == "su":
-            matrix = (z[:, : d * d] + 1j * z[:, d * d :]).reshape(-1, d, d)
-        else:
-            matrix = z.reshape(-1, d, d)
-        return _haar(matrix)
+        d, kind = group.degree, _compact_kind(group)
+        if kind is None:
+            return _walk(group, z.reshape(len(z), _FACTORS, group.dim))
+        matrix = z[:, : d * d] + 1j * z[:, d * d :] if kind == "su" else z
+        return _haar(matrix.reshape(-1, d, d))
 
 
 def _spread(group: MatrixGroup, spread: ArrayLike) -> Array:
@@ -348,6 +350,41 @@ def _compact_kind(group: MatrixGroup) -> str | None:
         return "so"
     traceless = np.allclose(np.trace(group.basis, axis1=1, axis2=2), 0, atol=1e-14)
     return "su" if np.iscomplexobj(group.basis) and traceless and group.dim == d * d - 1 else None
+
+
+#: Factors of `_walk`, and the standard deviation of each, in an orthonormal basis.
+_FACTORS, _WIDTH = 24, 8.0
+
+
+def _is_compact(group: MatrixGroup) -> bool:
+    """Whether all one-parameter subgroups stay bounded: then -tr(A B) is an invariant inner product, and a generic element has
+    eigenvalues on the imaginary axis. The form alone would take diag(2 i t, t) for one, the eigenvalues alone a shear."""
+    form = _trace_form(group)
+    if np.linalg.eigvalsh(form)[0] <= 1e-9 * np.max(np.abs(form)):
+        return False
+    generic = group.hat(np.sqrt(np.arange(2.0, 2.0 + group.dim)))
+    values = np.linalg.eigvals(generic)
+    return bool(np.max(np.abs(values.real)) <= 1e-9 * np.max(np.abs(values)))
+
+
+def _trace_form(group: MatrixGroup) -> Array:
+    """(n, n) matrix of -Re tr(A B) in the basis."""
+    return np.asarray(-np.einsum("aij,bji->ab", group.basis, group.basis).real)
+
+
+def _walk(group: MatrixGroup, z: Array) -> Array:
+    """(N, factors, n) Gaussian numbers -> (N, d, d) elements, Haar's measure to rounding.
+
+    xi = Ad_g H with g from Haar's measure, H in a Cartan subalgebra, for a Gaussian in an invariant inner product; so wide that exp H is
+    uniform on the torus. Such a measure acts on an irreducible representation by one number, the part of its zero weights in its
+    dimension (1/3 for the rotations of space, 1/4 for the adjoint of SU(3)), and the product of k elements by its k-th power: it tends
+    to Haar's measure (Peter and Weyl).
+    """
+    axes = np.linalg.inv(np.linalg.cholesky(_trace_form(group)))
+    X = np.broadcast_to(np.eye(group.degree), (len(z), group.degree, group.degree))
+    for k in range(z.shape[1]):
+        X = X @ expm(group.hat(_WIDTH * z[:, k] @ axes))
+    return np.asarray(X)
 
 
 def _haar(gaussian: Array) -> Array:

@@ -106,6 +106,54 @@ def test_haar_by_the_moments_of_the_trace(name: str, degree: int) -> None:
         assert stats.kstest(angle, lambda a: (a - np.sin(a)) / np.pi).pvalue > 1e-3
 
 
+def test_haar_of_compact_groups_in_other_matrices() -> None:
+    """SO(3) in its five-dimensional representation, and SU(2) x SO(3) in blocks: moments of characters count invariants."""
+    five = lc.from_matrices("five", ("a", "b", "c"), _conjugations())
+    made = lc.OnGroup(five)
+    X = made.draw(uniforms(5, "X", 0, 4_000, made.slots))
+    # chi_2 = 1 + 2 cos a + 2 cos 2 a, the angle with density (1 - cos)/pi
+    trace = np.trace(X, axis1=1, axis2=2)
+    a = np.linspace(0, np.pi, 20_001)
+    moments = [
+        _integral((1 + 2 * np.cos(a) + 2 * np.cos(2 * a)) ** k * (1 - np.cos(a)) / np.pi, a) for k in (1, 2, 3, 4)
+    ]
+    for k, moment in enumerate(moments, 1):
+        assert abs(np.mean(trace**k) - moment) < 5 * np.std(trace**k) / np.sqrt(len(X))
+    blocks = [np.zeros((5, 5), dtype=complex) for _ in range(6)]
+    for i in range(3):
+        blocks[i][:2, :2] = lc.group("su2").basis[i]
+        blocks[3 + i][2:, 2:] = lc.group("so3").basis[i]
+    made = lc.OnGroup(lc.from_matrices("blocks", tuple("abcdef"), blocks))
+    X = made.draw(uniforms(6, "X", 0, 4_000, made.slots))
+    spin, turn = np.trace(X[:, :2, :2], axis1=1, axis2=2).real, np.trace(X[:, 2:, 2:], axis1=1, axis2=2).real
+    for value, moment in (
+        (spin, 0),
+        (spin**2, 1),
+        (turn, 0),
+        (turn**2, 1),
+        (spin**2 * turn, 0),
+        (spin**2 * turn**2, 1),
+    ):
+        assert abs(np.mean(value) - moment) < 5 * np.std(value) / np.sqrt(len(X))
+
+
+def _integral(values: np.ndarray, at: np.ndarray) -> float:
+    return float(np.sum((values[1:] + values[:-1]) / 2 * np.diff(at)))
+
+
+def _conjugations() -> list[np.ndarray]:
+    """S -> A S - S A on the symmetric matrices of trace zero, in an orthogonal basis that is not normed."""
+    basis = [np.diag([1.0, -1, 0]), np.diag([1.0, 1, -2])]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        S = np.zeros((3, 3))
+        S[i, j] = S[j, i] = 1
+        basis.append(S)
+    return [
+        np.array([[np.sum(P * (A @ Q - Q @ A)) / np.sum(P * P) for Q in basis] for P in basis])
+        for A in lc.group("so3").basis
+    ]
+
+
 def test_concentrated_elements_have_their_spread() -> None:
     mean = lc.build("se3").exp(np.array([0.3, -0.2, 0.1, 1, 2, 3]))
     made = lc.OnGroup("se3", spread=[0.01, 0.02, 0.03, 0.1, 0.2, 0.3], mean=mean)
