@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.algebra.brackets import bracket
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.areas import areas, moments
 from lie_codegen.averaging.nilpotent import nilpotency_step
@@ -139,8 +140,7 @@ class Averaged(Saved):
         value = eps * tilde + eps**2 * times * self.F[1]
         if self.order == 2:
             return np.asarray(value)
-        c = self.group.algebra.structure_constants
-        crossed = np.einsum("i,...j,ijk->...k", self.F[1], tilde, c)
+        crossed = bracket(self.group.algebra, self.F[1], tilde)
         return np.asarray(value + eps**2 * self.Lambda[1](times[..., 0]) + eps**3 * times * (self.F[2] + crossed / 2))
 
     def state(self, eps: float, t: ArrayLike) -> Array:

@@ -41,7 +41,7 @@ def chart_end(averaged: Averaged, eps: float, horizon: float) -> float | None:
 def inverse_determinant(group: MatrixGroup, g: Array) -> Array:
     """(k,) det M(g)^{-1}, numerically: column j is exp(-g_n ad_n) ... exp(-g_{j+1} ad_{j+1}) e_j."""
     n = group.dim
-    ad = np.swapaxes(group.algebra.structure_constants, 1, 2)
+    ad = group.algebra.ad_matrices
     columns = np.zeros((len(g), n, n))
     for j in range(n):
         vector = np.broadcast_to(np.eye(n)[j], (len(g), n))

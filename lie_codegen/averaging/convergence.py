@@ -18,6 +18,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from lie_codegen.algebra.brackets import ad
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.signals.periodic_input import PeriodicInput
@@ -62,8 +63,7 @@ def convergence(group: GroupLike, u: PeriodicInput, eps: float) -> Convergence:
     halves = np.diff(edges) / 2
     times = edges[:-1, None] + halves[:, None] * (x + 1)
     values = u(times)
-    c = group.algebra.structure_constants
-    ad_norm = _norms(np.einsum("...k,kji->...ij", values, c))
+    ad_norm = _norms(ad(group.algebra, values))
     norm = _norms(group.hat(values))
     adjoint, matrix = (eps * float(np.einsum("p,m,pm->", halves, w, v)) / u.T for v in (ad_norm, norm))
     same = bool(np.allclose(ad_norm, norm, rtol=1e-12, atol=1e-14))

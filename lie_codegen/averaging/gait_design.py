@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.algebra.brackets import bracket
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.gait_path import gait_of_fourier, gait_path
 from lie_codegen.averaging.path_end import product_of
@@ -120,11 +121,10 @@ class _Search:
         u = -np.einsum("...nk,...k->...n", A, rate)
         metric = self.connection.metric(r)
         energy = (self.h / 2) * np.einsum("...tk,...tkl,...tl->...", rate, metric, rate)
-        c = self.group.algebra.structure_constants
         first, second = u[..., 0::2, :], u[..., 1::2, :]
         # two Gauss points a step, X' = X u: Omega = h (u_1 + u_2) / 2 + sqrt(3) h^2 [u_1, u_2] / 12
         omega = self.h / 2 * (first + second)
-        omega = omega + np.sqrt(3) / 12 * self.h**2 * np.einsum("...i,...j,ijk->...k", first, second, c)
+        omega = omega + np.sqrt(3) / 12 * self.h**2 * bracket(self.group.algebra, first, second)
         X = _product(_exp(np.einsum("...n,nab->...ab", omega, self.basis)))
         log = self._log(X)
         rotation = np.sum(log[..., self.angles] ** 2, axis=-1)

@@ -22,10 +22,11 @@ from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.matrices import matrix_port
 from lie_codegen.groups.wei_norman.body import product_exp, rate
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
-from lie_codegen.kernel.linear import Vector, bracket, matmul, plus, scaled
+from lie_codegen.kernel.linear import Vector, matmul, plus, scaled
 from lie_codegen.on_demand import sympy as sp
 
 _SOURCE = {

@@ -9,6 +9,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.flow.magnus.exponent import GAUSS, from_gauss, reversed_bracket
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 _MOST_STEPS = 2**14
@@ -31,22 +32,9 @@ def end_of(group: MatrixGroup, velocity: Any, knots: Array, tolerance: float = 1
 
 def magnus_six(group: MatrixGroup, velocity: Any, starts: Array, h: Array) -> Array:
     """(N, n) exponents of steps X(t + h) = X(t) exp(Omega), from u at Gauss's three points; signs for X' = X hat(u)."""
-    c = group.algebra.structure_constants
-
-    def bracket(x: Array, y: Array) -> Array:
-        # X' = X u is X' = u X with the bracket reversed
-        return np.asarray(np.einsum("ti,tj,ijk->tk", y, x, c))
-
-    offset = np.sqrt(15) / 10
-    times = starts[:, None] + h[:, None] * (0.5 + offset * np.array([-1, 0, 1]))
-    u = velocity(times.ravel()).reshape(len(starts), 3, -1)
-    step = h[:, None]
-    first = step * u[:, 1]
-    second = np.sqrt(15) / 3 * step * (u[:, 2] - u[:, 0])
-    third = 10 / 3 * step * (u[:, 2] - 2 * u[:, 1] + u[:, 0])
-    one = bracket(first, second)
-    two = -bracket(first, 2 * third + one) / 60
-    return np.asarray(first + third / 12 + bracket(-20 * first - third + one, second + two) / 240)
+    times = starts[:, None] + h[:, None] * GAUSS
+    u = h[:, None, None] * velocity(times.ravel()).reshape(len(starts), 3, -1)
+    return from_gauss(reversed_bracket(group.algebra), *np.moveaxis(u, 1, 0))
 
 
 def product_of(steps: Array) -> Array:

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.algebra.brackets import bracket, dexp_inverse
+from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.gait_path import gait_path
 from lie_codegen.averaging.shape_form import ShapeForm
@@ -74,7 +76,7 @@ class GaitAverage(Value):
             return np.asarray(expm(self.group.hat(periods * self.log(eps))))
         space, terms = _space(self.group, self.order, self.T), [Field(codes, values) for codes, values in self.fields]
         carried = Advected(self.group, "mu", "momentum", self.momentum)
-        X, c = np.eye(self.group.degree, dtype=self.group.basis.dtype), self.group.algebra.structure_constants
+        X = np.eye(self.group.degree, dtype=self.group.basis.dtype)
         n, h = self.group.dim, periods * self.T / (_FLOW_STEPS * periods)
 
         def velocity(Y: Array) -> Array:
@@ -87,8 +89,7 @@ class GaitAverage(Value):
             for part in (0.5, 0.5, 1.0):
                 theta = part * h * stages[-1]
                 alpha = velocity(X @ expm(self.group.hat(theta)))
-                once = np.einsum("i,j,ijk->k", theta, alpha, c)
-                stages.append(alpha + once / 2 + np.einsum("i,j,ijk->k", theta, once, c) / 12)
+                stages.append(dexp_inverse(self.group.algebra, theta, alpha))
             k1, k2, k3, k4 = stages
             X = X @ expm(self.group.hat(h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)))
         return np.asarray(X)
@@ -98,12 +99,12 @@ class GaitAverage(Value):
 class _Sampled:
     """Signals with values in the algebra at equally spaced nodes of a period, (M, n): a Calculus of the recursion."""
 
-    structure: Array
+    algebra: LieAlgebra
     period: float
 
     def bracket(self, x: Array, y: Array, *, mean_only: bool = False) -> Array:
         """[x, y] at the nodes."""
-        return np.asarray(np.einsum("ti,tj,ijk->tk", x, y, self.structure))
+        return bracket(self.algebra, x, y)
 
     def combine(self, terms: Iterable[tuple[Fraction | int, Array]]) -> Array:
         """sum of factor * signal."""
@@ -140,7 +141,7 @@ def gait_average(
     U = [-np.einsum("tnk,tk->tn", a, rate) for a in terms]
     if momentum is not None:
         return _with_momentum(connection, middle, s, U, path.T, order, momentum)
-    calculus: Calculus[Array] = _Sampled(group.algebra.structure_constants, path.T)
+    calculus: Calculus[Array] = _Sampled(group.algebra, path.T)
     series: Any = U
     rates, _ = floquet_magnus(calculus, series, order)
     F = np.array([f[0] for f in rates])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import ad
 from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -55,18 +56,13 @@ class ShapeFrame(Value):
 
     def turned(self, r: Array, DA: Array) -> Array:
         """The curvature seen from the new frame, (..., k, k, n)."""
-        back = expm(-ad(self.group, self.beta(r)[0]))
+        back = expm(-ad(self.group.algebra, self.beta(r)[0]))
         return np.asarray(np.einsum("...ab,...ijb->...ija", back, DA))
-
-
-def ad(group: MatrixGroup, x: Array) -> Array:
-    """(..., n, n) matrices of [x, .]."""
-    return np.asarray(np.einsum("...i,ijk->...kj", x, group.algebra.structure_constants))
 
 
 def moved_by(group: MatrixGroup, beta: Array, slopes: Array, A: Array) -> Array:
     """Ad(h^-1) A - rjac(beta) dbeta, (..., n, k); analytic in all its arguments."""
-    turn = -ad(group, beta)
+    turn = -ad(group.algebra, beta)
     # rjac(beta) = sum_j (-ad_beta)^j / (j + 1)!
     total = identity = np.broadcast_to(np.eye(group.dim), turn.shape)
     for j in range(_SERIES, 0, -1):

@@ -12,9 +12,10 @@ from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
+from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector, bracket, dot, plus, scaled
+from lie_codegen.kernel.linear import Matrix, Vector, dot, plus, scaled
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.on_demand import sympy as sp
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lie_codegen.algebra.brackets import bracket
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -63,8 +64,7 @@ def line_drift(group: GroupLike, lines: Sequence[VibrationLine]) -> Array:
         if line.omega in seen:
             raise InputError(f"line_drift: two lines at omega = {line.omega:g}; add their amplitudes first")
         seen.add(line.omega)
-        bracket = np.einsum("i,j,ijk->k", line.cosine, line.sine, group.algebra.structure_constants)
-        total += bracket / (2 * line.omega)
+        total += bracket(group.algebra, np.array(line.cosine), np.array(line.sine)) / (2 * line.omega)
     return total
 
 

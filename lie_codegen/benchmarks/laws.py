@@ -10,8 +10,9 @@ from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.groups.catalogue_load import group as load
 from lie_codegen.groups.kernels import group_kernel
 from lie_codegen.kernel.arithmetic import Arithmetic
+from lie_codegen.kernel.brackets import ad_star, bracket
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, ad_star, bracket, matvec, minus, plus
+from lie_codegen.kernel.linear import Vector, matvec, minus, plus
 
 
 def log_tracker() -> Kernel:

@@ -18,9 +18,10 @@ from lie_codegen.groups.maps.log_routine import closed_log, log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.dual import DualArithmetic, split, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
-from lie_codegen.kernel.linear import Matrix, Vector, bracket, matmul, matvec, minus, negative
+from lie_codegen.kernel.linear import Matrix, Vector, matmul, matvec, minus, negative
 from lie_codegen.kernel.parameter import symbol_values
 from lie_codegen.on_demand import sympy as sp
 

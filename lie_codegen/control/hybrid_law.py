@@ -36,12 +36,12 @@ from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
     Matrix,
     Vector,
-    bracket,
     constant_matrix,
     dot,
     matmul,

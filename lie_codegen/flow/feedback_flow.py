@@ -16,7 +16,7 @@ from lie_codegen.flow.attitude_metrics import second_kind_along
 from lie_codegen.flow.feedback_law import Feedback, feedback_body
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.flow.pair853 import System, integrate
-from lie_codegen.flow.product_rate import dexp_inverse, product_rate, reach_of
+from lie_codegen.flow.product_rate import product_rate, reach_of, turning
 from lie_codegen.flow.product_step import Move
 from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.flow.trajectory import Trajectory
@@ -267,7 +267,7 @@ def _alone(
     def rate(t: float, y: Array) -> Array:
         X = X_here @ exp(y[:n])
         xi = (eps * value(t, X, y[n:])).tolist()
-        turn = dexp_inverse(ops, group, y[:n].tolist(), xi)
+        turn = turning(ops, group, y[:n].tolist(), xi)
         return np.array([*turn, *(wei_norman_rate(ops, data, y[n:].tolist(), xi) if len(g0) else [])], dtype=float)
 
     X_here, g = np.array(X0), np.array(g0)

@@ -12,10 +12,9 @@ import numpy as np
 
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.linear import Vector, bracket
+from lie_codegen.kernel.brackets import BERNOULLI, bracket, dexp_inverse
+from lie_codegen.kernel.linear import Vector
 
-#: B_2k / (2k)! for k = 1 .. 6. For |ad Theta| <= 1 the next term is 3e-11 of the first.
-_SERIES = (1 / 12, -1 / 720, 1 / 30240, -1 / 1209600, 1 / 47900160, -691 / 1307674368000)
 #: Up to this |hat(Theta)| the Taylor polynomial of a group without a closed exponential is exact to rounding.
 _TAYLOR_REACH = 0.25
 
@@ -31,25 +30,18 @@ class Move(Protocol):
     def __call__(self, ops: Arithmetic, X: Any, theta: Vector, /) -> Any: ...
 
 
-def dexp_inverse(ops: Arithmetic, group: MatrixGroup, theta: Vector, xi: Vector) -> Vector:
-    """Theta' of X = X_0 exp(Theta), X' = X hat(xi): xi + ad xi/2 + sum_k B_2k/(2k)! ad^2k xi, ad = [Theta, .].
-
-    The sign of ad/2 is that of X' = X hat(xi). Of rotations ad^3 = -s^2 |Theta|^2 ad, so two brackets are enough.
-    """
+def turning(ops: Arithmetic, group: MatrixGroup, theta: Vector, xi: Vector) -> Vector:
+    """`dexp_inverse` to rounding. Of rotations ad^3 = -s^2 |Theta|^2 ad, so two brackets are enough."""
+    speed = rotation_rate(group)
+    if speed is None:
+        return dexp_inverse(ops, group.algebra, theta, xi, len(BERNOULLI))
     once = bracket(ops, group.algebra, theta, xi)
     twice = bracket(ops, group.algebra, theta, once)
-    speed = rotation_rate(group)
-    if speed is not None:
-        x = -speed * speed * sum((a * a for a in theta[1:]), theta[0] * theta[0])
-        factor: Scalar = _SERIES[-1]
-        for coefficient in reversed(_SERIES[:-1]):
-            factor = coefficient + x * factor
-        return [e + a / 2 + factor * b for e, a, b in zip(xi, once, twice, strict=True)]
-    total = [e + a / 2 + _SERIES[0] * b for e, a, b in zip(xi, once, twice, strict=True)]
-    for coefficient in _SERIES[1:]:
-        twice = bracket(ops, group.algebra, theta, bracket(ops, group.algebra, theta, twice))
-        total = [e + coefficient * b for e, b in zip(total, twice, strict=True)]
-    return total
+    x = -speed * speed * sum((a * a for a in theta[1:]), theta[0] * theta[0])
+    factor: Scalar = ops.constant(BERNOULLI[-1])
+    for coefficient in reversed(BERNOULLI[:-1]):
+        factor = ops.constant(coefficient) + x * factor
+    return [e + a / 2 + factor * b for e, a, b in zip(xi, once, twice, strict=True)]
 
 
 def rotation_rate(group: MatrixGroup) -> float | None:
@@ -88,5 +80,5 @@ def product_rate(
         place += move.group.dim
     now = [move(ops, X, theta) for move, X, theta in zip(moves, elements, thetas, strict=True)]
     velocities, slope = rates(t, now, list(y[place:]))
-    turned = [dexp_inverse(ops, m.group, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)]
+    turned = [turning(ops, m.group, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)]
     return [x for each in turned for x in each] + list(slope)

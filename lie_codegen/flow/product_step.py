@@ -16,7 +16,8 @@ from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.linear import Vector, bracket, matmul, plus, scaled
+from lie_codegen.kernel.brackets import dexp_inverse
+from lie_codegen.kernel.linear import Vector, matmul, plus, scaled
 
 #: (stage, t, elements, v) -> body velocities of the elements and the rate of v; stage 0, 1, 2 at t, t + h/2, t + h.
 Rates = Callable[[int, Scalar, list[Any], Vector], tuple[list[Vector], Vector]]
@@ -35,13 +36,6 @@ class Move:
         return matmul(X, exp_matrix(ops, self.derivation, theta))
 
 
-def pulled(ops: Arithmetic, group: MatrixGroup, theta: Vector, xi: Vector) -> Vector:
-    """Theta' = xi + [Theta, xi]/2 + [Theta, [Theta, xi]]/12: the signs are those of X' = X hat(xi)."""
-    once = bracket(ops, group.algebra, theta, xi)
-    twice = bracket(ops, group.algebra, theta, once)
-    return [e + a / 2 + b / 12 for e, a, b in zip(xi, once, twice, strict=True)]
-
-
 def product_step(
     ops: Arithmetic, moves: Sequence[Move], elements: Sequence[Any], v: Vector, rates: Rates, t: Scalar, h: Scalar
 ) -> tuple[list[Any], Vector]:
@@ -53,7 +47,9 @@ def product_step(
         moved = [move(ops, X, theta) for move, X, theta in zip(moves, elements, thetas, strict=True)]
         velocities, slope = rates(stage, (t, t + h / 2, t + h)[stage], moved, plus(v, scaled(part, slopes[-1])))
         # The first stage is at Theta = 0, where the algebra's equation reads Theta' = xi: only the later ones are pulled back.
-        turns.append([pulled(ops, m.group, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)])
+        turns.append(
+            [dexp_inverse(ops, m.group.algebra, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)]
+        )
         slopes.append(slope)
         weights.append(weight)
     shares = [h * weight / 6 for weight in weights]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.flow.magnus.exponent import GAUSS, from_gauss, reversed_bracket
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.periodic_input import PeriodicInput
 
@@ -78,19 +79,8 @@ def _one_period(group: MatrixGroup, u: PeriodicInput, eps: float, knots: Array, 
     """X at the knots: (k, d, d)."""
     h = np.repeat(np.diff(knots) / parts, parts)
     starts = (knots[:-1, None] + np.diff(knots)[:, None] * np.arange(parts) / parts).ravel()
-    root = np.sqrt(15.0)
-    values = u(starts[:, None] + h[:, None] * (0.5 + np.array([-root, 0.0, root]) / 10))
-    a1, a2, a3 = (eps * h[:, None] * values[:, m] for m in range(3))
-    c = group.algebra.structure_constants
-
-    def bracket(x: Array, y: Array) -> Array:
-        return np.asarray(np.einsum("ti,tj,ijk->tk", y, x, c, optimize=True))
-
-    alpha1, alpha2, alpha3 = a2, root / 3 * (a3 - a1), 10 / 3 * (a3 - 2 * a2 + a1)
-    first = bracket(alpha1, alpha2)
-    second = -bracket(alpha1, 2 * alpha3 + first) / 60
-    omega = alpha1 + alpha3 / 12 + bracket(-20 * alpha1 - alpha3 + first, alpha2 + second) / 240
-    steps = expm(group.hat(omega))
+    values = eps * h[:, None, None] * u(starts[:, None] + h[:, None] * GAUSS)
+    steps = expm(group.hat(from_gauss(reversed_bracket(group.algebra), *np.moveaxis(values, 1, 0))))
     states = [np.eye(group.degree, dtype=steps.dtype)]
     for start in range(0, len(steps), parts):
         block = steps[start]

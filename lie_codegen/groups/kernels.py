@@ -24,16 +24,17 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect
-from lie_codegen.groups.maps.exponential import ad_body, exp_matrix, jacobian
+from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.maps.renormalise import renormalised
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman import body as wei_norman_body
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernel.brackets import ad, bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
-from lie_codegen.kernel.linear import bracket, identity, matmul
+from lie_codegen.kernel.linear import identity, matmul
 
 _WEI_NORMAN = "Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and Krishnaprasad, TR 93-59, (12)-(15)"
 _JACOBIANS = (
@@ -166,7 +167,7 @@ def _group_adjoint(data: GroupDerivation) -> Kernel:
 
 def _algebra_adjoint(data: GroupDerivation) -> Kernel:
     def body(ops: Arithmetic, x: Any) -> tuple[Any, ...]:
-        return (ad_body(ops, data, x),)
+        return (ad(ops, data.group.algebra, x),)
 
     return _kernel(data, "ad", [_vector(data, "x")], [_square(data, "ad_x")], body, "ad_x y = [x, y]", _BRACKET)
 

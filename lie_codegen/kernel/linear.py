@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.structural_zeros import add, product
 from lie_codegen.on_demand import sympy as sp
@@ -88,21 +87,3 @@ def transpose(a: Sequence[Sequence[Scalar]]) -> Matrix:
 def identity(size: int) -> Matrix:
     """The identity, in plain integers."""
     return [[int(i == j) for j in range(size)] for i in range(size)]
-
-
-def bracket(ops: Arithmetic, algebra: LieAlgebra, x: Sequence[Scalar], y: Sequence[Scalar]) -> Vector:
-    """[x, y] = ad_x y."""
-    result: Vector = [0] * algebra.dim
-    for (i, j), row in algebra.table.items():
-        value = add(product(x[i], y[j]), product(-1, product(x[j], y[i])))
-        for k, c in row.items():
-            result[k] = add(result[k], product(number(ops, c), value))
-    return result
-
-
-def ad_star(ops: Arithmetic, algebra: LieAlgebra, x: Sequence[Scalar], a: Sequence[Scalar]) -> Vector:
-    """ad*_x a, the transpose of the matrix of ad_x: <ad*_x a, y> = <a, [x, y]>."""
-    result: Vector = [0] * algebra.dim
-    for i, j, k, c in algebra.constants():
-        result[j] = add(result[j], product(number(ops, c), product(x[i], a[k])))
-    return result

@@ -20,12 +20,13 @@ from itertools import product
 from typing import Any, TypeAlias
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.algebra.subspace import bracket
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.numbers import domain_matrix, exact_number
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
 from lie_codegen.mechanics.connection import metric_of, symmetric_product
-from lie_codegen.mechanics.euler_poincare import bracket, euler_poincare, velocity_symbols
+from lie_codegen.mechanics.euler_poincare import euler_poincare, velocity_symbols
 from lie_codegen.on_demand import sympy as sp
 
 _DEGREE = 4
@@ -80,7 +81,7 @@ def second_order_controllability(
         growth.append(len(span))
     closed = span
     while True:
-        longer = _independent(closed + [bracket(algebra, x, y) for x, y in product(closed, repeat=2)])
+        longer = _independent(closed + [list(bracket(algebra, x, y)) for x, y in product(closed, repeat=2)])
         if len(longer) == len(closed):
             break
         closed = longer

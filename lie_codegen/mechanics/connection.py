@@ -19,7 +19,9 @@ from lie_codegen.errors import ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
-from lie_codegen.mechanics.euler_poincare import ad_star, bracket
+from lie_codegen.kernel.brackets import ad_star, bracket
+from lie_codegen.kernel.linear import plus
+from lie_codegen.mechanics.euler_poincare import EXACT
 from lie_codegen.on_demand import sympy as sp
 
 
@@ -92,6 +94,6 @@ def _nabla(
     algebra: LieAlgebra, inertia: sp.MatrixBase, inverse: sp.MatrixBase, x: Sequence[sp.Expr], y: Sequence[sp.Expr]
 ) -> list[sp.Expr]:
     lowered_x, lowered_y = list(inertia * sp.Matrix(list(x))), list(inertia * sp.Matrix(list(y)))
-    symmetric = [a + b for a, b in zip(ad_star(algebra, x, lowered_y), ad_star(algebra, y, lowered_x), strict=True)]
+    symmetric = plus(ad_star(EXACT, algebra, x, lowered_y), ad_star(EXACT, algebra, y, lowered_x))
     raised = list(inverse * sp.Matrix(symmetric))
-    return [sp.expand((a - b) / 2) for a, b in zip(bracket(algebra, x, y), raised, strict=True)]
+    return [sp.expand((a - b) / 2) for a, b in zip(bracket(EXACT, algebra, x, y), raised, strict=True)]

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import ad_star
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -22,13 +23,13 @@ def damped_end(
     """
     from scipy.integrate import solve_ivp
 
-    c, inverse = group.algebra.structure_constants, np.linalg.inv(inertia)
+    inverse = np.linalg.inv(inertia)
     kind = complex if group.is_complex else float
     d, size = group.degree, group.degree**2
 
     def rate(t: float, y: Array) -> Array:
         X, xi = y[:size].reshape(d, d), y[size:].real
-        total = np.einsum("i,ijk,k->j", xi, c, inertia @ xi) - damping @ xi + force(t)
+        total = ad_star(group.algebra, xi, inertia @ xi) - damping @ xi + force(t)
         return np.concatenate([(X @ group.hat(xi)).ravel(), inverse @ total])
 
     y = np.concatenate([np.eye(d, dtype=kind).ravel(), np.zeros(group.dim)])

@@ -17,9 +17,10 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import ad_star, dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector, ad_star, bracket, matvec, plus, scaled
+from lie_codegen.kernel.linear import Matrix, Vector, matvec, plus, scaled
 
 
 def driven_increments(
@@ -37,10 +38,8 @@ def driven_increments(
 
     def rates(theta: Vector, change: Vector, force: Vector) -> tuple[Vector, Vector]:
         eta = plus(xi, change)
-        once = bracket(ops, group.algebra, theta, eta)
-        twice = bracket(ops, group.algebra, theta, once)
         turning = ad_star(ops, group.algebra, eta, matvec(J, eta))
-        return plus(eta, scaled(0.5, once), scaled(1 / 12, twice)), matvec(inverse, plus(turning, force))
+        return dexp_inverse(ops, group.algebra, theta, eta), matvec(inverse, plus(turning, force))
 
     zero: Vector = [0] * group.dim
     stages = [rates(zero, zero, f0)]

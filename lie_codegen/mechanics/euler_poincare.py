@@ -11,23 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
+from lie_codegen.kernel.brackets import ad_star
+from lie_codegen.kernel.exact_arithmetic import ExactArithmetic
 from lie_codegen.on_demand import sympy as sp
 
-
-def ad_star(algebra: LieAlgebra, x: Sequence[sp.Expr], a: Sequence[sp.Expr]) -> list[sp.Expr]:
-    """ad*_x a with <ad*_x a, y> = <a, [x, y]>, exact."""
-    result: list[sp.Expr] = [sp.S.Zero] * algebra.dim
-    for i, j, k, value in algebra.constants():
-        result[j] += value * x[i] * a[k]
-    return result
-
-
-def bracket(algebra: LieAlgebra, x: Sequence[sp.Expr], y: Sequence[sp.Expr]) -> list[sp.Expr]:
-    """[x, y], exact."""
-    result: list[sp.Expr] = [sp.S.Zero] * algebra.dim
-    for i, j, k, value in algebra.constants():
-        result[k] += value * x[i] * y[j]
-    return result
+EXACT = ExactArithmetic()
 
 
 def velocity_symbols(algebra: LieAlgebra) -> tuple[sp.Symbol, ...]:
@@ -40,7 +28,7 @@ def euler_poincare(
 ) -> list[sp.Expr]:
     """xi' = I^{-1} (ad*_xi I xi + f), expanded."""
     momentum = list(inertia * sp.Matrix(list(xi)))
-    total = ad_star(algebra, xi, momentum)
+    total = ad_star(EXACT, algebra, xi, momentum)
     if force is not None:
         total = [a + b for a, b in zip(total, force, strict=True)]
     return [sp.expand(entry) for entry in inertia.inv() * sp.Matrix(total)]

@@ -14,9 +14,10 @@ from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import ad_star
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector, ad_star, constant_matrix, dot, matvec, plus
+from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, dot, matvec, plus
 from lie_codegen.on_demand import sympy as sp
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.algebra.brackets import dexp_inverse
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
@@ -333,7 +334,7 @@ class MechanicalAverage(Value):
         if not logarithms:
             return GroupState(X, xi)
         frozen = [(f, first[..., None] * eps[..., None] ** q * self._at(f, when)) for q, f in enumerate(logarithms)]
-        group, c, h = self.system.group, self.system.group.algebra.structure_constants, 1 / _FLOW_STEPS
+        group, h = self.system.group, 1 / _FLOW_STEPS
 
         def slope(Y: Array, eta: Array, theta: Array, change: Array) -> tuple[Array, Array]:
             here = Y @ expm(group.hat(theta))
@@ -341,9 +342,7 @@ class MechanicalAverage(Value):
             parts = [self._value(f, state, values) for f, values in frozen]
             total = sum(parts[1:], parts[0])
             alpha, beta = total[..., 0, :], total[..., 1, :]
-            once = np.einsum("...i,...j,ijk->...k", theta, alpha, c)
-            twice = np.einsum("...i,...j,ijk->...k", theta, once, c)
-            return alpha + once / 2 + twice / 12, beta
+            return dexp_inverse(group.algebra, theta, alpha), beta
 
         for _ in range(_FLOW_STEPS):
             zero = np.zeros_like(xi)

@@ -13,8 +13,9 @@ from lie_codegen.groups.maps.matrices import matrix_port, random_element
 from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, bracket, plus, scaled
+from lie_codegen.kernel.linear import Vector, plus, scaled
 from lie_codegen.kernel.structural_zeros import add, product
 from lie_codegen.mechanics.mechanical_fields import Fourier, MechanicalFields
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
@@ -157,17 +158,13 @@ def moved(ops: Arithmetic, system: MechanicalSystem, state: Sequence[Scalar], ra
     """One fourth-order step of X' = X hat(alpha), xi' = beta, Gamma' = -(rho(alpha) Gamma + r(alpha)): Munthe-Kaas for X."""
     group, n, size = system.group, system.dim, packed_size(system.group)
     X, s = unpack(group, state[:size]), list(state[size:])
-    half, twelfth = ops.constant(0.5), ops.constant(1 / 12)
+    half = ops.constant(0.5)
 
     def slope(part: float, theta: Vector, change: Vector) -> tuple[Vector, Vector]:
         here = plus(s, change)
         alpha, beta = rate(part, here)
-        once = bracket(ops, group.algebra, theta, alpha)
-        twice = bracket(ops, group.algebra, theta, once)
-        return plus(alpha, scaled(half, once), scaled(twelfth, twice)), [
-            *beta,
-            *_advected_rate(ops, system, alpha, here[n:]),
-        ]
+        turned = dexp_inverse(ops, group.algebra, theta, alpha)
+        return turned, [*beta, *_advected_rate(ops, system, alpha, here[n:])]
 
     nothing: Vector = [0] * len(s)
     stages = [slope(0.0, [0] * n, nothing)]

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import bracket, symmetric_product
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError, UncontrollableError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
@@ -67,9 +68,7 @@ class VirtualActuation(Value):
 
     def product(self, x: Array, y: Array) -> Array:
         """<x : y> = -J^-1 (ad*_x J y + ad*_y J x), (n,)."""
-        c = self.group.algebra.structure_constants
-        force = np.einsum("i,ijk,k->j", x, c, self.inertia @ y) + np.einsum("i,ijk,k->j", y, c, self.inertia @ x)
-        return np.asarray(-self.inverse @ force)
+        return symmetric_product(self.group.algebra, self.inertia, self.inverse, x, y)
 
     @cached_property
     def products(self) -> Array:
@@ -105,10 +104,9 @@ class VirtualActuation(Value):
     @cached_property
     def _lie_rank(self) -> int:
         """Dimensions of the Lie span of the Y."""
-        c = self.group.algebra.structure_constants
         rows = self.lifts / np.linalg.norm(self.lifts, axis=1, keepdims=True)
         while True:
-            more = np.vstack([rows, np.einsum("ai,bj,ijk->abk", rows, rows, c).reshape(-1, self.group.dim)])
+            more = np.vstack([rows, *(bracket(self.group.algebra, row, rows) for row in rows)])
             _, sizes, basis = np.linalg.svd(more)
             rank = int(np.sum(sizes > _RANK * sizes[0]))
             if rank == len(rows):

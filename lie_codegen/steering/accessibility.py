@@ -7,9 +7,11 @@ in long enough time on a compact group (Jurdjevic and Sussmann, J. Differential 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import bracket
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 
@@ -21,13 +23,7 @@ _RANK = 1e-9
 def with_drift(algebra: LieAlgebra, controls: Sequence[int], drift: Array) -> int:
     """Dimension of what the brackets of the controls and the drift fill."""
     start = np.vstack([np.eye(algebra.dim)[list(controls)], drift])
-    return len(closure(independent(start), bracket_of(algebra), independent))
-
-
-def bracket_of(algebra: LieAlgebra) -> Product:
-    """[x, y] of coordinates."""
-    c = algebra.structure_constants
-    return lambda x, y: np.asarray(np.einsum("i,j,ijk->k", x, y, c))
+    return len(closure(independent(start), partial(bracket, algebra), independent))
 
 
 def closure(rows: Array, product: Product, span: Callable[[Array], Array]) -> Array:

@@ -7,12 +7,15 @@ the symmetric products <x : y> = -J^-1 (ad*_x J y + ad*_y J x) of the Y_a = J^-1
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
+from lie_codegen.algebra.brackets import bracket, symmetric_product
 from lie_codegen.arrays import Array
 from lie_codegen.errors import UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.accessibility import bracket_of, closure
+from lie_codegen.steering.accessibility import closure
 
 _RANK = 1e-8
 
@@ -37,15 +40,10 @@ def require_torques_reach(group: MatrixGroup, controls: tuple[int, ...], inertia
 
 def torque_growth(group: MatrixGroup, controls: tuple[int, ...], inertia: Array) -> tuple[Array, Array]:
     """Orthonormal rows that span the closure of J^-1 f_a under symmetric products, and that closure's Lie span."""
-    c = group.algebra.structure_constants
     inverse = np.linalg.inv(inertia)
-
-    def symmetric(x: Array, y: Array) -> Array:
-        force = np.einsum("i,ijk,k->j", x, c, inertia @ y) + np.einsum("i,ijk,k->j", y, c, inertia @ x)
-        return np.asarray(-inverse @ force)
-
+    symmetric = partial(symmetric_product, group.algebra, inertia, inverse)
     products = closure(_span(inverse[list(controls)]), symmetric, _span)
-    return products, closure(products, bracket_of(group.algebra), _span)
+    return products, closure(products, partial(bracket, group.algebra), _span)
 
 
 def _span(rows: Array) -> Array:

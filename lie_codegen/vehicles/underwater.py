@@ -26,9 +26,10 @@ from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import ad_star
 from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector, ad_star, cross, dot, matvec, minus, number, plus, scaled
+from lie_codegen.kernel.linear import Vector, cross, dot, matvec, minus, number, plus, scaled
 from lie_codegen.kernel.parameter import INPUT, Parameter, input_ports, is_input, sample_inputs, values_of
 from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import sympy as sp

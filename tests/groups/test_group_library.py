@@ -325,7 +325,7 @@ def test_an_edit_makes_those_groups_stale_that_are_made_from_it(
     }
     assert stale_after("groups/kernels.py", lambda text: text + "\ndel _MAKERS['log']\n") == {"so3", "h3"}
     assert stale_after(
-        "groups/kernels.py", lambda text: text.replace("exp_matrix, jacobian", "exp_matrix, ad_body as jacobian")
+        "groups/kernels.py", lambda text: text.replace("exp_matrix, jacobian", "exp_matrix, coordinates as jacobian")
     ) == {
         "so3",
         "h3",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.flow.product_rate import rotation_rate
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 #: Up to this dimension brackets come from structure constants, unrolled; above, as products of matrices (measured on su4, su8).
@@ -78,14 +79,8 @@ def _quaternion(group: MatrixGroup, parts: int) -> tuple[float, tuple[tuple[Prod
     exp(sum x_i A_i) has the quaternion (cos(s|x|/2), sin(s|x|/2) x/|x|). With Q = (2/s) sum q_i A_i:
     X = q_0 + Q where A_i A_j + A_j A_i = -(s^2/2) delta_ij, and X = 1 + q_0 Q + Q^2/2 where hat(x)^3 = -s^2 |x|^2 hat(x).
     """
-    c = group.algebra.structure_constants
-    if group.dim != 3 or c[0, 1, 2] == 0:
-        return 0.0, ()
-    s = float(c[0, 1, 2])
-    turn = np.zeros((3, 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        turn[i, j, k], turn[j, i, k] = s, -s
-    if not np.array_equal(c, turn):
+    s = rotation_rate(group)
+    if s is None:
         return 0.0, ()
     A, one = np.asarray(group.basis), np.eye(group.degree)
     pairs = np.einsum("aij,bjk->abik", A, A)

@@ -9,6 +9,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.flow.magnus.exponent import eighth_order, reversed_bracket, sixth_order
 from lie_codegen.flow.magnus.steps import Steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -32,32 +33,12 @@ def exponent(group: MatrixGroup, a: Array, order: int) -> Array:
 
     Order 8 is Blanes, Casas and Ros, BIT 40 (2000) 434; from moments of four orders, a_2 of three is a_2 + 3 a_4 / 20.
     """
-    return exponent_of(group.algebra.structure_constants, a, order)
-
-
-def exponent_of(structure: Array, a: Array, order: int) -> Array:
-    """The same from (n, n, n) structure constants."""
-    n = len(structure)
-    constants = structure.reshape(n * n, n)
-
-    def c(x: Array, y: Array) -> Array:
-        outer = x[..., :, None] * y[..., None, :]
-        return np.asarray(-(outer.reshape(*outer.shape[:-2], n * n) @ constants))
-
+    c = reversed_bracket(group.algebra)
     a1, a2, a3, a4 = (a[..., j, :] for j in range(4))
     if order == 8:
-        s1 = -c(a1 + a3 / 28, a2 + 3 * a4 / 28) / 28
-        r1 = c(a1, s1 - a3 / 14) / 3
-        s2 = c(a1 + a3 / 28 + s1, a2 + 3 * a4 / 28 + r1)
-        r2 = c(a1 + 5 * s1 / 4, 2 * a3 + s2 + c(a2, s1) / 2)
-        s3 = c(a1 + a3 / 12 - 7 * s1 / 3 - s2 / 6, -9 * a2 - 9 * a4 / 4 + 63 * r1 + r2)
-        return np.asarray(a1 + a3 / 12 - 7 * s2 / 120 + s3 / 360)
+        return eighth_order(c, a1, a2, a3, a4)
     b = a2 + 3 * a4 / 20
-    once = c(a1, b)
-    if order == 4:
-        return np.asarray(a1 + a3 / 12 - once / 12)
-    twice = -c(a1, 2 * a3 + once) / 60
-    return np.asarray(a1 + a3 / 12 + c(-20 * a1 - a3 + once, b + twice) / 240)
+    return np.asarray(a1 + a3 / 12 - c(a1, b) / 12) if order == 4 else sixth_order(c, a1, b, a3)
 
 
 def expm1(A: Array) -> Array:

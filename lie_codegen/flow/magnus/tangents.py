@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.flow.magnus.exponent import eighth_order, reversed_bracket
 from lie_codegen.flow.magnus.library import magnus_library
-from lie_codegen.flow.magnus.numpy_steps import expm1, exponent_of
+from lie_codegen.flow.magnus.numpy_steps import expm1
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.parametric_input import ParametricInput
 
@@ -73,15 +74,16 @@ class TangentAlgebra:
     """Pairs (x, dx) with [(x, dx), (y, dy)] = ([x, y], [x, dy] + [dx, y])."""
 
     def __init__(self, group: MatrixGroup) -> None:
-        n = group.dim
         self.group = group
-        c = group.algebra.structure_constants
-        self.constants = np.zeros((2 * n, 2 * n, 2 * n))
-        self.constants[:n, :n, :n] = self.constants[:n, n:, n:] = self.constants[n:, :n, n:] = c
 
     def exponent(self, a: Array) -> Array:
         """Omega of order 8 and its derivative."""
-        return exponent_of(self.constants, a, 8)
+        return eighth_order(self._reversed, *np.moveaxis(a, -2, 0))
+
+    def _reversed(self, x: Array, y: Array) -> Array:
+        n, c = self.group.dim, reversed_bracket(self.group.algebra)
+        first, second = x[..., :n], y[..., :n]
+        return np.concatenate([c(first, second), c(first, y[..., n:]) + c(x[..., n:], second)], axis=-1)
 
     def hat(self, x: Array) -> Array:
         """[[hat(x), hat(dx)], [0, hat(x)]]."""

@@ -21,11 +21,12 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.kernels import group_kernel
-from lie_codegen.groups.maps.exponential import ad_body, exp_matrix, jacobian
+from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import ad
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matadd, matmul, matvec, number, scaled, transpose
@@ -103,7 +104,7 @@ def _flow(data: GroupDerivation) -> Kernel:
         moved = exp_matrix(ops, data, scaled(duration, u))
         end = matmul(matrices.read(X), [row[: data.group.degree] for row in matrices.read(moved)])
         h = duration / 2**_DOUBLINGS
-        A = [scaled(-1, row) for row in ad_body(ops, data, scaled(h, u))]
+        A = [scaled(-1, row) for row in ad(ops, data.group.algebra, scaled(h, u))]
         # Over a short step: F = sum A^k / k!, and the noise sum L^k(h Q) / (k + 1)! with L(P) = A P + P A^T.
         F, power = identity(n), identity(n)
         added = term = [scaled(h, row) for row in Q]
@@ -198,12 +199,7 @@ def _sandwich(ops: Arithmetic, algebra: LieAlgebra, S: Matrix, P: Matrix) -> Mat
 
 def _weighted(ops: Arithmetic, algebra: LieAlgebra, S: Matrix) -> list[Matrix]:
     """For each k the matrix sum_j S_jk ad_j."""
-    n = algebra.dim
-    result: list[Matrix] = [[[0] * n for _ in range(n)] for _ in range(n)]
-    for j, b, a, value in algebra.constants():
-        for k in range(n):
-            result[k][a][b] = result[k][a][b] + number(ops, value) * S[j][k]
-    return result
+    return [ad(ops, algebra, column) for column in transpose(S)]
 
 
 def _zero(x: Scalar) -> bool:

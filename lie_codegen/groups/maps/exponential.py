@@ -32,8 +32,9 @@ from lie_codegen.groups.maps.spectral_functions import (
 )
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
+from lie_codegen.kernel.brackets import ad
 from lie_codegen.kernel.complex_scalar import Complex
-from lie_codegen.kernel.linear import Matrix, Vector, bracket, dot, identity, number
+from lie_codegen.kernel.linear import Matrix, Vector, dot, number
 from lie_codegen.kernel.structural_zeros import is_zero
 
 _FUNCTIONS: dict[tuple[str, bool], MatrixFunction] = {
@@ -66,7 +67,7 @@ def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: 
     if data.adjoint_pattern is None and data.adjoint_spectrum is not None:
         function = inverse_jacobian_of_exp if inverse else jacobian_of_exp
         sign = 1 if side == "left" else -1
-        return function(ops, ad_body(ops, data, x), data.adjoint_spectrum, data.adjoint_relation, sign)
+        return function(ops, ad(ops, data.group.algebra, x), data.adjoint_spectrum, data.adjoint_relation, sign)
     if data.adjoint_pattern is None:
         return _plain(ops, data, x, 1 if side == "left" else -1, inverse=inverse)
     family = LinearFamily(ops, data.ads, x)
@@ -76,16 +77,10 @@ def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: 
     return [[column.get(i, 0) for column in columns] for i in range(n)]
 
 
-def ad_body(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> Matrix:
-    """(n, n) the matrix of ad x."""
-    columns = [bracket(ops, data.group.algebra, x, unit) for unit in identity(data.group.dim)]
-    return [list(row) for row in zip(*columns, strict=True)]
-
-
 def _plain(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], sign: int, *, inverse: bool) -> Matrix:
     """The Jacobian modulo the characteristic polynomial of ad; its inverse by blocks."""
     traceless = all(matrix.trace() == 0 for matrix in data.ads)
-    J = plain_jacobian_of_exp(ops, ad_body(ops, data, x), traceless=traceless, sign=sign)
+    J = plain_jacobian_of_exp(ops, ad(ops, data.group.algebra, x), traceless=traceless, sign=sign)
     if not inverse:
         return J
     n = data.group.dim

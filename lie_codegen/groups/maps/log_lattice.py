@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import ad
 from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.log_iterations import matrix_log
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -40,7 +41,7 @@ def lattice_log(group: MatrixGroup, X: Array, certified: Callable[[Array], bool]
         if not z.size or found == ENOUGH:
             break
         weights, seed = random_numbers(z.shape[1], seed)
-        T = z @ _null(_ad(group, z @ weights) @ z)
+        T = z @ _null(ad(group.algebra, z @ weights) @ z)
         weights, seed = random_numbers(T.shape[1], seed)
         cost_y = _turned(group, X, T, T @ weights)
         if cost_y is None:
@@ -62,13 +63,6 @@ def random_numbers(count: int, seed: int) -> tuple[Array, int]:
         seed = (seed * 1103515245 + 12345) % 2**31
         values.append(seed / 2**30 - 1)
     return np.array(values), seed
-
-
-def _ad(group: MatrixGroup, x: Array) -> Array:
-    ad = np.zeros((group.dim, group.dim))
-    for i, j, k, value in group.algebra.constants():
-        ad[k, j] += x[i] * float(value)
-    return ad
 
 
 def _null(matrix: Array) -> Array:

@@ -12,24 +12,15 @@ from lie_codegen.groups.maps.short_exponential import short_pattern, times_short
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp, rate
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
+from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Body, Kernel, Port
-from lie_codegen.kernel.structural_zeros import add, is_zero, product
+from lie_codegen.kernel.linear import matmul, scaled
+from lie_codegen.kernel.structural_zeros import is_zero, product
 
 #: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
 TAYLOR_DEGREE = 12
-
-
-def bracket_body(group: MatrixGroup, ops: Arithmetic, x: Sequence[Scalar], y: Sequence[Scalar]) -> list[Scalar]:
-    """[x, y] from the structure constants."""
-    result: list[Scalar] = [0] * group.dim
-    for (i, j), row in group.algebra.table.items():
-        wedge = x[i] * y[j] - x[j] * y[i]
-        for k, value in row.items():
-            term = wedge if value == 1 else -wedge if value == -1 else ops.constant(value) * wedge
-            result[k] = add(result[k], term)
-    return result
 
 
 def rkmk4_increment(
@@ -41,17 +32,11 @@ def rkmk4_increment(
     Munthe-Kaas, BIT 38 (1998) 92.
     """
 
-    half, twelfth = ops.constant(Fraction(1, 2)), ops.constant(Fraction(1, 12))  # products are cheaper than quotients
-
-    def rate_at(theta: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
-        first = bracket_body(group, ops, theta, u)
-        second = bracket_body(group, ops, theta, first)
-        return [v + half * a + twelfth * b for v, a, b in zip(u, first, second, strict=True)]
-
+    half = ops.constant(Fraction(1, 2))
     k1 = list(u0)
-    k2 = rate_at([half * h * k for k in k1], um)
-    k3 = rate_at([half * h * k for k in k2], um)
-    k4 = rate_at([h * k for k in k3], u1)
+    k2 = dexp_inverse(ops, group.algebra, scaled(half * h, k1), um)
+    k3 = dexp_inverse(ops, group.algebra, scaled(half * h, k2), um)
+    k4 = dexp_inverse(ops, group.algebra, scaled(h, k3), u1)
     return [h / 6 * (a + 2 * (b + c) + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
 
 
@@ -63,7 +48,6 @@ def times_taylor_exp(
     degree: int = TAYLOR_DEGREE,
 ) -> Any:
     """X exp(hat(theta)) by Horner's rule on the Taylor polynomial, X (I + A (I + A/2 (I + A/3 ...))), or the short form of it."""
-    size = group.degree
     generator = hat_body(group, ops, theta)
     pattern = short_pattern(group)
     if pattern is not None and degree > pattern.zeros + 1:
@@ -72,11 +56,8 @@ def times_taylor_exp(
     for order in range(degree, 0, -1):
         factor = ops.constant(Fraction(1, order))
         value = [
-            [
-                _moved(X[i][j], sum_products((value[i][m], generator[m][j]) for m in range(size)), factor)
-                for j in range(size)
-            ]
-            for i in range(size)
+            [_moved(entry, total, factor) for entry, total in zip(*rows, strict=True)]
+            for rows in zip(X, matmul(value, generator), strict=True)
         ]
     return value
 
@@ -103,16 +84,6 @@ def hat_body(group: MatrixGroup, ops: Arithmetic, x: Sequence[Scalar]) -> list[l
 
 def _coefficient(ops: Arithmetic, value: Any) -> Scalar:
     return int(value) if value.is_Integer else ops.constant(value)
-
-
-def sum_products(pairs: Any) -> Any:
-    """sum a b over pairs, plain zeros left out."""
-    total: Any = None
-    for a, b in pairs:
-        if isinstance(b, int) and b == 0:
-            continue
-        total = a * b if total is None else total + a * b
-    return 0 if total is None else total
 
 
 @kernel_factory(group=as_group)

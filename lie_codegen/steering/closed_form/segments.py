@@ -20,6 +20,7 @@ from typing import Protocol
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import bracket
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 
@@ -144,7 +145,5 @@ class FigureEight:
 
 def double_bracket(algebra: LieAlgebra, controls: tuple[int, ...], a: Array, b: Array) -> Array:
     """(n,) [a, [a, b]] for a and b in the span of the controls."""
-    c = algebra.structure_constants
-    place = list(controls)
-    inner = np.einsum("i,j,ijk->k", a, b, c[np.ix_(place, place)])
-    return np.asarray(np.einsum("i,j,ijk->k", a, inner, c[place]))
+    first, second = (each @ np.eye(algebra.dim)[list(controls)] for each in (a, b))
+    return bracket(algebra, first, bracket(algebra, first, second))

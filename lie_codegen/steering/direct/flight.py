@@ -6,17 +6,15 @@ with the signs of a velocity that acts from the right); the steps are halved unt
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.flow.magnus.exponent import GAUSS, from_gauss
 from lie_codegen.steering.direct.inputs import Drive
 
 _AGREE = 1e-13
 _MOST = 256
-_GAUSS = np.array([0.5 - math.sqrt(15) / 10, 0.5, 0.5 + math.sqrt(15) / 10])
 
 
 def fly(drive: Drive, parts: int = 1) -> tuple[Array, Array]:
@@ -44,10 +42,10 @@ def _states(drive: Drive, knots: Array, parts: int, steps: int) -> tuple[Array, 
     t0 = (knots[:-1, None] + np.diff(knots)[:, None] * inner).ravel()
     h = np.repeat(np.diff(knots) / (parts * steps), parts * steps)
     sampled = Drive(system, drive.inputs, True)
-    a = [system.group.hat(h[:, None] * sampled(t0 + c * h)) for c in _GAUSS]
+    a = [system.group.hat(h[:, None] * sampled(t0 + c * h)) for c in GAUSS]
     if system.right:
         a = [np.swapaxes(each, 1, 2) for each in a]
-    E = expm(_magnus(*a))
+    E = expm(from_gauss(_reversed_commutator, *a))
     X = np.asarray(system.start, dtype=E.dtype)
     X = X.T if system.right else X
     states = [X]
@@ -59,14 +57,5 @@ def _states(drive: Drive, knots: Array, parts: int, steps: int) -> tuple[Array, 
     return np.append(t0[::steps], knots[-1]), np.swapaxes(found, 1, 2) if system.right else found
 
 
-def _magnus(a1: Array, a2: Array, a3: Array) -> Array:
-    """The exponent of one step for X' = X a; a(t) times the step's length at the three Gauss points."""
-    alpha1, alpha2, alpha3 = a2, math.sqrt(15) / 3 * (a3 - a1), 10 / 3 * (a3 - 2 * a2 + a1)
-    first = _bracket(alpha2, alpha1)  # [alpha1, alpha2] with the sign of the other side
-    second = _bracket(2 * alpha3 + first, alpha1) / -60
-    third = _bracket(alpha2 + second, -20 * alpha1 - alpha3 + first) / 240
-    return np.asarray(alpha1 + alpha3 / 12 + third)
-
-
-def _bracket(x: Array, y: Array) -> Array:
-    return np.asarray(x @ y - y @ x)
+def _reversed_commutator(x: Array, y: Array) -> Array:
+    return np.asarray(y @ x - x @ y)

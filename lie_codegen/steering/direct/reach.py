@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
+from lie_codegen.algebra.brackets import bracket
 from lie_codegen.errors import UncontrollableError
-from lie_codegen.steering.accessibility import bracket_of, closure, independent
+from lie_codegen.steering.accessibility import closure, independent
 from lie_codegen.steering.direct.system import System
 from lie_codegen.steering.goals import End
 
@@ -25,7 +28,7 @@ def require_reach(system: System, duration: float, end: End) -> None:
     t = np.linspace(0.0, duration, 1 if system.steady else _SAMPLES)
     rows = [system.directions_at(t).reshape(-1, group.dim), system.drift.at(t), end.before, end.after]
     first = independent(np.vstack(rows[:2]))
-    filled = closure(first, bracket_of(group.algebra), independent)
+    filled = closure(first, partial(bracket, group.algebra), independent)
     if len(filled) == group.dim or end.elements is None or len(end.before) or len(end.after):
         return
     missing = np.eye(group.dim) - filled.T @ filled

@@ -22,10 +22,11 @@ from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import vee
 from lie_codegen.groups.maps.logarithm import candidate
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.maps.rkmk import bracket_body, hat_body
+from lie_codegen.groups.maps.rkmk import hat_body
+from lie_codegen.kernel.brackets import ad_star, bracket_form, dexp_inverse
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
-from lie_codegen.kernel.linear import ad_star, matmul
+from lie_codegen.kernel.linear import matmul
 from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.ocp.problem_data import ProblemData, total_square
 from lie_codegen.steering.ocp.terms import Point, derivation
@@ -138,9 +139,7 @@ class ModelBuilder:
         at = self._point(X, z)
         xi = data.xi(at)
         if data.integrator == "rkmk4" and not data.is_invariant:
-            first = bracket_body(self.group, _OPS, theta, xi)
-            second = bracket_body(self.group, _OPS, theta, first)
-            xi = [v + a / 2 + b / 12 for v, a, b in zip(xi, first, second, strict=True)]
+            xi = dexp_inverse(_OPS, self.group.algebra, theta, xi)
         k = ca.vertcat(*[ca.SX(entry) for entry in (*xi, *data.rate(at))])
         # z enters as x's own and as the change of y: one derivative serves both
         zsym = self.x[self.size :]
@@ -184,7 +183,7 @@ class ModelBuilder:
             pulled = self._pulled_back(weights, right)
             # (lambda . J_r(theta) omega) differentiated once by each: the quadratic form is its symmetric part
             by_theta = ca.jacobian(pulled, self.y[:n])
-            C = ca.reshape(ca.vertcat(*map(ca.SX, self._bracket_form(ca.vertsplit(weights)))), n, n).T
+            C = _matrix(bracket_form(_OPS, self.group.algebra, ca.vertsplit(weights)))
             outputs = {"S": (by_theta + by_theta.T) / 2, "C": C}
             functions.append(self._function("model_move_hessian", [self.y, mu], outputs))
         return functions
@@ -215,14 +214,6 @@ class ModelBuilder:
         cube = matmul(square, D)
         series = [[D[i][j] - _half(square[i][j]) + cube[i][j] * (1 / 3) for j in d] for i in d]
         return vee(_OPS, self.exact, series)
-
-    def _bracket_form(self, weights: Sequence[Any]) -> list[Any]:
-        """The matrix of (a, b) -> lambda . [a, b], row by row."""
-        n = self.n
-        rows: list[list[Any]] = [[0] * n for _ in range(n)]
-        for i, j, k, value in self.group.algebra.constants():
-            rows[i][j] = rows[i][j] + float(value) * weights[k]
-        return [entry for row in rows for entry in row]
 
     def _costs(self, second_order: bool) -> list[Any]:
         data = self.data

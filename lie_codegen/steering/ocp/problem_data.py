@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.linear import Matrix, Vector, ad_star, dot, matvec, plus, scaled
+from lie_codegen.kernel.brackets import ad_star
+from lie_codegen.kernel.linear import Matrix, Vector, dot, matvec, plus, scaled
 from lie_codegen.steering.ocp.layout import Layout
 from lie_codegen.steering.ocp.terms import Point, Scope, Term
 

@@ -15,14 +15,15 @@ from fractions import Fraction
 from typing import Any
 
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
-from lie_codegen.groups.maps.rkmk import bracket_body, hat_body, sum_products
+from lie_codegen.groups.maps.rkmk import hat_body
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import ad_star, bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import plus
+from lie_codegen.kernel.linear import dot, matmul, plus
 from lie_codegen.kernel.structural_zeros import add
-from lie_codegen.steering.shooting.lie_poisson_ends import advance, correction, endpoint, offset, sparse_product
+from lie_codegen.steering.shooting.lie_poisson_ends import advance, correction, endpoint, offset
 
 
 @kernel_factory()
@@ -70,7 +71,7 @@ def costate_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
         u = (u0, u1, u2)
         steps = _stages(ops, lambda y, half: _coadjoint(group, controls, ops, u[half], y), mu)
         weights = [ops.constant(Fraction(k, 24)) for k in (5, 4, 4, -1)]
-        middle = [y + sum_products(zip(weights, slopes, strict=True)) for y, *slopes in zip(mu, *steps, strict=True)]
+        middle = [y + dot(weights, slopes) for y, *slopes in zip(mu, *steps, strict=True)]
         return middle, _after(ops, mu, steps)
 
     return Kernel(
@@ -167,7 +168,7 @@ def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
             (u, mu), psi, xi = nodes[half], state[:n], state[n:]
             du = _velocity(controls, v, psi)
             psi_rate = plus(_coadjoint(group, controls, ops, du, mu), _coadjoint(group, controls, ops, u, psi))
-            xi_rate = bracket_body(group, ops, xi, _spread(group, controls, u))
+            xi_rate = bracket(ops, group.algebra, xi, _spread(group, controls, u))
             for value, position in zip(du, controls, strict=True):
                 xi_rate[position] = add(value, xi_rate[position])
             return [*psi_rate, *xi_rate]
@@ -225,21 +226,11 @@ def _velocity(controls: tuple[int, ...], v: Sequence[Scalar], mu: Sequence[Scala
 def _coadjoint(
     group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, u: Sequence[Scalar], mu: Sequence[Scalar]
 ) -> list[Scalar]:
-    position = {basis: number for number, basis in enumerate(controls)}
-    result: list[Scalar] = [0] * group.dim
-    for (i, j), row in group.algebra.table.items():
-        pairing = sum_products(
-            (ops.constant(value) if abs(value) != 1 else int(value), mu[k]) for k, value in row.items()
-        )
-        if i in position:
-            result[j] = add(result[j], u[position[i]] * pairing)
-        if j in position:
-            result[i] = add(result[i], -(u[position[j]] * pairing))
-    return result
+    return ad_star(ops, group.algebra, _spread(group, controls, u), mu)
 
 
 def _moving(group: MatrixGroup, controls: tuple[int, ...], ops: Arithmetic, u: Sequence[Scalar], X: Any) -> list[Any]:
-    return pack(group, sparse_product(unpack(group, X), hat_body(group, ops, _spread(group, controls, u))))
+    return pack(group, matmul(unpack(group, X), hat_body(group, ops, _spread(group, controls, u))))
 
 
 def _spread(group: MatrixGroup, controls: tuple[int, ...], u: Sequence[Scalar]) -> list[Scalar]:

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
-from lie_codegen.groups.maps.rkmk import bracket_body, hat_body, sum_products, times_taylor_exp
+from lie_codegen.groups.maps.rkmk import hat_body, times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.structural_zeros import is_zero
+from lie_codegen.kernel.linear import dot, matmul, matvec, plus
 
 #: Taylor degree of the exponential in the seed's logarithm, for |theta| below 1.
 SEED_EXPONENTIAL_DEGREE = 8
@@ -30,9 +31,9 @@ def endpoint(group: MatrixGroup) -> Kernel:
     def body(ops: Arithmetic, target: Any, X: Any) -> tuple[Any, ...]:
         r = [x - goal for x, goal in zip(X, target, strict=True)]
         moves = right_moves(group, ops, X)
-        q = [sum_products(zip(move, r, strict=True)) for move in moves]
-        G = [[sum_products(zip(moves[max(k, j)], moves[min(k, j)], strict=True)) for j in range(n)] for k in range(n)]
-        return sum_products(zip(r, r, strict=True)), q, G
+        q = [dot(move, r) for move in moves]
+        G = [[dot(moves[max(k, j)], moves[min(k, j)]) for j in range(n)] for k in range(n)]
+        return dot(r, r), q, G
 
     return Kernel(
         "endpoint",
@@ -48,7 +49,7 @@ def right_moves(group: MatrixGroup, ops: Arithmetic, X: Sequence[Scalar]) -> lis
     """X A_k, packed, for each k, from X packed."""
     matrix = unpack(group, X)
     units = [[1 if j == k else 0 for j in range(group.dim)] for k in range(group.dim)]
-    return [pack(group, sparse_product(matrix, hat_body(group, ops, unit))) for unit in units]
+    return [pack(group, matmul(matrix, hat_body(group, ops, unit))) for unit in units]
 
 
 @kernel_factory()
@@ -79,10 +80,8 @@ def offset(group: MatrixGroup) -> Kernel:
         matrix = unpack(group, X)
         entries = [Complex.of(_minus(matrix[i][j], 1 if i == j else 0)) for i in range(d) for j in range(d)]
         parts = [entry.re for entry in entries] + [entry.im for entry in entries]
-        rows = [
-            [(ops.constant(float(w)), p) for w, p in zip(row, parts, strict=True) if abs(w) > 1e-14] for row in weights
-        ]
-        return ([sum_products(row) for row in rows],)
+        rows = [[ops.constant(float(w)) if abs(w) > 1e-14 else 0 for w in row] for row in weights]
+        return (matvec(rows, parts),)
 
     return Kernel(
         "offset",
@@ -100,9 +99,7 @@ def correction(group: MatrixGroup) -> Kernel:
     n = group.dim
 
     def body(ops: Arithmetic, x: Any, y: Any) -> tuple[Any, ...]:
-        first = bracket_body(group, ops, x, y)
-        second = bracket_body(group, ops, x, first)
-        return ([a + b + c / 2 + e / 12 for a, b, c, e in zip(x, y, first, second, strict=True)],)
+        return (plus(x, dexp_inverse(ops, group.algebra, x, y)),)
 
     return Kernel(
         "correction",
@@ -112,15 +109,6 @@ def correction(group: MatrixGroup) -> Kernel:
         body,
         formula="z = x + y + [x, y] / 2 + [x, [x, y]] / 12",
     )
-
-
-def sparse_product(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
-    """a b; the plain zeros of b are left out."""
-    size = len(a)
-    return [
-        [sum_products((a[i][m], b[m][j]) for m in range(size) if not is_zero(b[m][j])) for j in range(size)]
-        for i in range(size)
-    ]
 
 
 def _minus(value: Any, number: int) -> Any:

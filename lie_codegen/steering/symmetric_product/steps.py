@@ -12,9 +12,10 @@ from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import ad_star, dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector, ad_star, bracket, matvec, plus, scaled, transpose
+from lie_codegen.kernel.linear import Matrix, Vector, matvec, plus, scaled, transpose
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
 
@@ -67,10 +68,8 @@ def oscillation_step(group: MatrixGroup, forces: int) -> Kernel:
         def slope(part: float, theta: Vector, change: Vector) -> tuple[Vector, Vector]:
             v, U = at_stages[part]
             xi = plus(w, change, U)
-            once = bracket(ops, group.algebra, theta, xi)
-            twice = bracket(ops, group.algebra, theta, once)
             force = plus(ad_star(ops, group.algebra, xi, matvec(J, xi)), scaled(-1, matvec(D, xi)))
-            return plus(xi, scaled(0.5, once), scaled(1 / 12, twice)), plus(matvec(inverse, force), v)
+            return dexp_inverse(ops, group.algebra, theta, xi), plus(matvec(inverse, force), v)
 
         stages = [slope(0.0, [0] * n, [0] * n)]
         for part in (0.5, 0.5, 1.0):

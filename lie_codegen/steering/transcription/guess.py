@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.algebra.brackets import ad_star
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, NotFiniteError, ShapeError
 from lie_codegen.steering.obstacles.homotopy import planar_discs
@@ -143,6 +144,6 @@ def smooth_torques(task: Task, structure: Structure, numbers: Numbers, v: Array)
     xi = np.zeros((len(t), task.group.dim))
     xi[:, list(structure.controls)] = eased
     momentum = xi @ second.inertia
-    turning = np.einsum("ti,ijk,tk->tj", xi, task.group.algebra.structure_constants, momentum)
+    turning = ad_star(task.group.algebra, xi, momentum)
     torques = np.gradient(momentum, t, axis=0) - turning
     return states, xi, torques[:, list(structure.controls)]

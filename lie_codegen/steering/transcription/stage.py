@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.groups.maps.element_pattern import pack, unpack
-from lie_codegen.groups.maps.rkmk import bracket_body, sum_products, times_taylor_exp
+from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
+from lie_codegen.kernel.linear import matmul
 from lie_codegen.mechanics.driven_step import driven_increments
 from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
@@ -41,9 +43,7 @@ def interval(structure: Structure) -> Piece:
     simple, simple_change = _midpoint(structure, at, h) if structure.second_order else (theta, change)
     E = times_taylor_exp(group, _OPS, _identity(group), ca.vertsplit(theta), _EXPONENTIAL_DEGREE)
     X = unpack(group, ca.vertsplit(S))
-    d = group.degree
-    product = [[sum_products((X[i][k], E[k][j]) for k in range(d)) for j in range(d)] for i in range(d)]
-    moved = ca.vertcat(*[ca.SX(entry) for entry in pack(group, product)])
+    moved = ca.vertcat(*[ca.SX(entry) for entry in pack(group, matmul(X, E))])
     rest = [v + r, at.parts["s"], at.parts["h"]]
     others, simple_others = ca.vertcat(*change, *rest), ca.vertcat(*simple_change, *rest)
     energy = ca.dot(at.parts["weights"], v * v + v * (v + r) + (v + r) ** 2) * h / 3
@@ -88,7 +88,7 @@ def _increments(structure: Structure, at: Symbols, h: Any) -> tuple[Any, list[An
     spread = ca.DM(np.eye(group.dim)[:, list(structure.controls)])
     if not structure.second_order:
         first = at.parts["drift"] + spread @ v
-        turn = bracket_body(group, _OPS, ca.vertsplit(first), ca.vertsplit(spread @ r))
+        turn = bracket(_OPS, group.algebra, ca.vertsplit(first), ca.vertsplit(spread @ r))
         return h * (first + spread @ (r / 2)) + h * h / 12 * ca.vertcat(*[ca.SX(t) for t in turn]), []
     n = group.dim
     J, inverse = ([ca.vertsplit(each[i * n : (i + 1) * n]) for i in range(n)] for each in _masses(at, n))

@@ -9,7 +9,12 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.brackets import ad, bracket_form
+from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
+from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import casadi as ca
+
+_OPS = CasadiArithmetic()
 
 
 def push(group: MatrixGroup, B: Array) -> tuple[Any, Any]:
@@ -44,22 +49,20 @@ def pushed(group: MatrixGroup, moved: Any, B: Array) -> Any:
 
 
 def ad_matrix(group: MatrixGroup, theta: Any) -> Any:
-    """ad_theta as a matrix: column j is [theta, e_j]."""
-    n = group.dim
-    result = ca.SX(n, n)
-    for (i, j), row in group.algebra.table.items():
-        for k, value in row.items():
-            result[k, j] += float(value) * theta[i]
-            result[k, i] -= float(value) * theta[j]
-    return result
+    """ad_theta: column j is [theta, e_j]."""
+    return _sparse(ad(_OPS, group.algebra, ca.vertsplit(theta)))
 
 
 def wedge(group: MatrixGroup, w: Any) -> Any:
     """P[i, k] = w . [e_i, e_k]."""
-    n = group.dim
-    result = ca.SX(n, n)
-    for (i, j), row in group.algebra.table.items():
-        for k, value in row.items():
-            result[i, j] += float(value) * w[k]
-            result[j, i] -= float(value) * w[k]
+    return _sparse(bracket_form(_OPS, group.algebra, ca.vertsplit(w)))
+
+
+def _sparse(rows: list[list[Any]]) -> Any:
+    """The matrix of these entries; plain zeros are structural ones."""
+    result = ca.SX(len(rows), len(rows))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            if not is_zero(entry):
+                result[i, j] = entry
     return result
