@@ -92,6 +92,16 @@ class Kernel:
         if not self.outputs:
             raise InputError(f"kernel {self.symbol} has no output")
 
+    def __repr__(self) -> str:
+        """One line: <kernel se3.exp: x (6) -> X (4, 4)>; `help` and `inputs`, `outputs`, `formula` tell the rest."""
+
+        def ports(each: tuple[Port, ...]) -> str:
+            return ", ".join(
+                f"{port.name} ({', '.join(map(str, port.shape))})" if port.shape else port.name for port in each
+            )
+
+        return f"<kernel {self.namespace}.{self.name}: {ports(self.inputs)} -> {ports(self.outputs)}>"
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Kernel):
             return NotImplemented
