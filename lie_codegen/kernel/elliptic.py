@@ -102,6 +102,17 @@ def jacobi(ops: Arithmetic, phi: Scalar, steps: Ladder) -> Jacobi:
     return Jacobi(s, c, d, z)
 
 
+def sn_cn_dn(ops: Arithmetic, phi: Scalar, moduli: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
+    """The three functions from the moduli of a ladder alone, for loops over phases that share it."""
+    theta = 4 * half_pi(ops) * phi
+    s, c, d = ops.sin(theta), ops.cos(theta), 1
+    for modulus in reversed(moduli):
+        square = modulus * s * s
+        inverse = 1 / (1 + square)
+        s, c, d = (1 + modulus) * s * inverse, c * d * inverse, (1 - square) * inverse
+    return s, c, d
+
+
 def phase(ops: Arithmetic, a: Scalar, b: Scalar, dn: Scalar, steps: Ladder) -> Scalar:
     """phi in (-1/2, 1/2] with sn : cn = a : b and the given dn: the ladder walked down, then one atan2.
 

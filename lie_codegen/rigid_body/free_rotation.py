@@ -149,7 +149,12 @@ def free_rotation(J: Any, X: ArrayLike, omega: ArrayLike) -> FreeRotation:
 
     Source: Benson and Scheeres, JGCD 44 (2021), for the torus; the section is the shortest arc, which is never singular here.
     """
-    matrix, moments, axes = principal_axes(J)
+    return rotation_about(principal_axes(J), X, omega)
+
+
+def rotation_about(principal: tuple[Array, Array, Array], X: ArrayLike, omega: ArrayLike) -> FreeRotation:
+    """`free_rotation` of what `principal_axes` found."""
+    matrix, moments, axes = principal
     start, rate = _rotation(X), np.asarray(omega, dtype=float)
     if rate.ndim < 1 or rate.shape[-1] != 3:
         raise ShapeError(f"free_rotation: omega has shape {rate.shape}, expected (..., 3)")

@@ -14,7 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.averaging.phase_routine import Frozen, no_tangent
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
-from lie_codegen.kernel.elliptic import jacobi, ladder, phase
+from lie_codegen.kernel.elliptic import DEPTH, jacobi, ladder, phase, sn_cn_dn
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.kernel.routine import Routine, call_routine
@@ -58,12 +58,20 @@ MOTION = (
 def precession_routine() -> Routine:
     """(k, r3, c) -> mean of 1 - c / (1 + r3 dn) and the coefficients of cos(4 pi n phi)."""
 
-    def dn(ops: Arithmetic, k: Scalar, phi: Scalar) -> tuple[Any, ...]:
-        return (jacobi(ops, phi, ladder(ops, k)).dn,)
+    def moduli(ops: Arithmetic, k: Scalar) -> tuple[Any, ...]:
+        return (list(ladder(ops, k).moduli),)
 
-    helper = Kernel("precession_dn", NAMESPACE, (Port("k", ()), Port("phi", ())), (Port("dn", ()),), dn)
+    def dn(ops: Arithmetic, below: Any, phi: Scalar) -> tuple[Any, ...]:
+        return (sn_cn_dn(ops, phi, below)[2],)
+
+    below = Port("moduli", (DEPTH,))
+    helpers = (
+        Kernel("precession_moduli", NAMESPACE, (Port("k", ()),), (below,), moduli),
+        Kernel("precession_dn", NAMESPACE, (below, Port("phi", ())), (Port("dn", ()),), dn),
+    )
     cosines = [repr(math.cos(2 * math.pi * j / NODES)) for j in range(NODES)]
-    settings = (("nodes", NODES), ("terms", TERMS), ("cosines", Frozen(cosines)), ("dn", helper.symbol))
+    settings = (("nodes", NODES), ("terms", TERMS), ("cosines", Frozen(cosines)), ("depth", DEPTH),
+                ("moduli", helpers[0].symbol), ("dn", helpers[1].symbol))  # fmt: skip
 
     def twin(values: Sequence[float]) -> Array:
         ops = NumpyArithmetic()
@@ -73,9 +81,7 @@ def precession_routine() -> Routine:
         waves = np.fft.rfft(samples)[: TERMS + 1].real / NODES
         return np.concatenate([waves[:1], 2 * waves[1:]])
 
-    return Routine(
-        "free_rotation_precession", 3, TERMS + 1, "precession.c.jinja", settings, (helper,), twin, no_tangent
-    )
+    return Routine("free_rotation_precession", 3, TERMS + 1, "precession.c.jinja", settings, helpers, twin, no_tangent)
 
 
 @kernel_factory()

@@ -9,6 +9,7 @@ from math import gcd
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 
@@ -34,18 +35,15 @@ class TorusSeries:
     m: float
     torque: float
 
-    def correction(self, phi: float, alpha: float) -> tuple[Array, list[tuple[int, int]]]:
-        """W (4,) at a point, osculating = mean + W, and the dropped (n1, n2)."""
+    def correction(self, phi: float, alpha: float) -> Array:
+        """W (4,) at a point, osculating = mean + W."""
+        divisor, small = _divisors(self.rate, self.m)
         n = np.fft.fftfreq(NODES, 1 / NODES)
         n1, n2 = n[:, None], n[None, :]
-        divisor = 2 * np.pi * self.rate * n1 + self.m * n2
-        least = SMALLEST_DIVISOR * min(2 * np.pi * abs(self.rate), abs(self.m))
-        kept = (np.abs(divisor) >= least) & (np.abs(n1) < NODES / 2) & (np.abs(n2) < NODES / 2)
+        kept = ~small & (np.abs(n1) < NODES / 2) & (np.abs(n2) < NODES / 2)
         factor = np.zeros_like(divisor, dtype=complex)
         factor[kept] = np.exp(1j * (2 * np.pi * n1 * phi + n2 * alpha))[kept] / (1j * divisor[kept])
-        small = ~kept & (np.abs(divisor) < least) & ((n1 != 0) | (n2 != 0))
-        dropped = [(int(n[i]), int(n[j])) for i, j in zip(*np.nonzero(small), strict=True)]
-        return np.real(np.einsum("ij,ijk->k", factor, self.waves)), dropped
+        return np.asarray(np.real(np.einsum("ij,ijk->k", factor, self.waves)))
 
     def harmonic(self, n1: int, n2: int) -> float:
         """|coefficient (n1, n2) of H'| over |mean of H'|; infinite where the mean is 0."""
@@ -62,6 +60,20 @@ def torus_series(sample: Callable[[Array, Array], tuple[Array, Array]], rate: fl
     rates, torque = sample(phi, alpha)
     waves = np.fft.fft2(rates, axes=(0, 1)) / NODES**2
     return TorusSeries(waves, rate, m, float(np.linalg.norm(torque, axis=-1).max()))
+
+
+def small_divisors(rate: float, m: float) -> list[tuple[int, int]]:
+    """The (n1, n2) that the periodic part leaves out."""
+    _, small = _divisors(rate, m)
+    n = np.fft.fftfreq(NODES, 1 / NODES)
+    return [(int(n[i]), int(n[j])) for i, j in zip(*np.nonzero(small), strict=True) if i or j]
+
+
+def _divisors(rate: float, m: float) -> tuple[Array, NDArray[np.bool_]]:
+    """n1 2 pi Lambda + n2 m, and where it is too small to divide by, (0, 0) among them."""
+    n = np.fft.fftfreq(NODES, 1 / NODES)
+    divisor = 2 * np.pi * rate * n[:, None] + m * n[None, :]
+    return divisor, np.abs(divisor) < SMALLEST_DIVISOR * min(2 * np.pi * abs(rate), abs(m))
 
 
 @cache

@@ -15,10 +15,10 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.rigid_body.free_rotation import FreeRotation, free_rotation
+from lie_codegen.rigid_body.free_rotation import FreeRotation, rotation_about
 from lie_codegen.rigid_body.inertia_matrix import principal_axes
 from lie_codegen.rigid_body.torques import Torque
-from lie_codegen.rigid_body.torus_map import TorusSeries, resonant_ratios, torus_series
+from lie_codegen.rigid_body.torus_map import TorusSeries, resonant_ratios, small_divisors, torus_series
 from lie_codegen.rigid_body.tumbling_kernels import MARGIN, matrix_of, tumbling_kernels
 from lie_codegen.rigid_body.tumbling_run import DirectRun, Resonance, TumblingEvent, TumblingRun
 from lie_codegen.runtime.broadcast import broadcast_call
@@ -64,13 +64,17 @@ class TumblingAverage(Saved):
     torques: tuple[Torque, ...]
 
     def kernels(self) -> tuple[Kernel, ...]:
-        """slow_rate, shape, ends, torque_at and direct_rate, for lc.build and lc.generate."""
+        """slow_rate, shape, ends, periodic, torque_at and direct_rate, for lc.build and lc.generate."""
         return tumbling_kernels(self.J, self.torques)
 
     @cached_property
     def library(self) -> Library:
         """The compiled kernels."""
         return build(self.kernels())
+
+    @cached_property
+    def _principal(self) -> tuple[Array, Array, Array]:
+        return principal_axes(self.J)
 
     @property
     def _has_plates(self) -> bool:
@@ -144,7 +148,7 @@ class TumblingAverage(Saved):
         """
         from scipy.spatial.transform import Rotation
 
-        free = free_rotation(self.J, X, omega)
+        free = rotation_about(self._principal, X, omega)
         times = np.atleast_1d(np.asarray(t, dtype=float))
         if len(times) < 2 or np.any(np.diff(times) <= 0) or not np.all(np.isfinite(times)):
             raise InputError("t: at least two finite, increasing times; the first is the start")
@@ -205,7 +209,7 @@ class TumblingAverage(Saved):
         return (np.concatenate(values),)
 
     def _free(self, X: ArrayLike, omega: ArrayLike) -> FreeRotation:
-        free = free_rotation(self.J, X, omega)
+        free = rotation_about(self._principal, X, omega)
         if np.any(free.fixed):
             raise InputError(
                 "tumbling_average: a rotation about a fixed axis (a sphere, rest, spin about the middle axis) has no torus to "
@@ -220,6 +224,11 @@ class TumblingAverage(Saved):
         w = body.paper.T @ free.omega0
         D = float(np.sum(body.inertia * (body.inertia - body.inertia[2]) * w**2))
         return body, np.array([*free.H, D, float(motion["phi"]), float(motion["alpha"])])
+
+    def _periodic(self, body: _Body, y: Array, t: float) -> tuple[Array, float]:
+        """W (4,) with osculating = mean + W, and the largest |N| on the torus."""
+        W, largest = self.library["periodic"](y, float(t), body.paper, body.inertia, *self._given(t))
+        return np.asarray(W), float(largest)
 
     def _series(self, body: _Body, y: Array, t: float) -> TorusSeries:
         _, rate, m, b = self.library["shape"](y[:3], float(y[3]), body.inertia)
@@ -239,8 +248,8 @@ class TumblingAverage(Saved):
             raise InputError(
                 f"tumbling_average: k = {float(free.k):.6f} is at the separatrix (margin {MARGIN}); use .direct"
             )
-        series = self._series(body, y, t[0])
-        ratio = series.torque * float(free.nutation_period) / float(np.linalg.norm(y[:3]))
+        W, largest = self._periodic(body, y, t[0])
+        ratio = largest * float(free.nutation_period) / float(np.linalg.norm(y[:3]))
         if ratio > LARGEST_TORQUE and not force:
             raise InputError(
                 f"tumbling_average: the torque turns H by {ratio:.3g} in one nutation (|N| Tn / L, at most {LARGEST_TORQUE}): an "
@@ -249,7 +258,7 @@ class TumblingAverage(Saved):
         dropped: list[tuple[int, int]] = []
         remark = ""
         if start == "mean":
-            W, dropped = series.correction(y[4], y[5])
+            dropped = small_divisors(float(free.motion["Lambda"]), float(free.motion["m"]))
             mean = np.concatenate([y[:4] - W, y[4:]])
             if float(self.library["shape"](mean[:3], float(mean[3]), body.inertia)[0]) < MARGIN:
                 y = mean
@@ -264,7 +273,7 @@ class TumblingAverage(Saved):
             if not len(rest):
                 break
             X, omega = run.event.continuations[f"{sign:+d}"]
-            body, y = self._start(free_rotation(self.J, X, omega))
+            body, y = self._start(rotation_about(self._principal, X, omega))
             more = self._piece(body, y, np.concatenate([[run.event.t], rest]), nodes, rtol, osculating, ratio, dropped)
             run = _joined(run, more)
         return run
@@ -306,7 +315,7 @@ class TumblingAverage(Saved):
         phi, alpha = (column if osculating else np.full(len(kept), np.nan) for column in (found[:, 4], found[:, 5]))
         if osculating:
             for i, (moment, state) in enumerate(zip(kept, found, strict=True)):
-                wave[i] = self._series(body, state, float(moment)).correction(state[4], state[5])[0]
+                wave[i] = self._periodic(body, state, float(moment))[0]
         full_H, full_D = H + wave[:, :3], D + wave[:, 3]
         full_energy = (np.sum(full_H**2, axis=1) - full_D) / (2 * body.inertia[2])
         return TumblingRun(
@@ -326,7 +335,7 @@ class TumblingAverage(Saved):
         from lie_codegen.kernel.arithmetic import FloatArithmetic
         from lie_codegen.rigid_body.rotation_formulas import frame_of, shape_at
 
-        _, moments, axes = principal_axes(self.J)
+        _, moments, axes = self._principal
         entered = body.mode != "SAM"
         order = [0, 1, 2] if entered else [2, 1, 0]
         P, inertia = axes[:, order], moments[order]
