@@ -105,11 +105,7 @@ class ClosedLoop(Saved):
         Raises:
             InputError: the loop has no law; or it is from a file, and its law was written by hand and has no definition.
         """
-        made = self._making
-        if made is None:
-            raise InputError(
-                "generate: a loop that was loaded knows its law only by a definition, and this one has none; run closed_loop again"
-            )
+        made = making_of(self, "generate")
         run, parts = made.in_steps()
         return loop_parts(run, made.reference, parts, name, real)
 
@@ -124,6 +120,20 @@ class ClosedLoop(Saved):
     def _made_by(self, making: LoopMaking) -> ClosedLoop:
         object.__setattr__(self, "_made", making)  # beside the fields: neither == nor a pickle sees it
         return self
+
+
+def making_of(run: ClosedLoop, what: str) -> LoopMaking:
+    """What made a run.
+
+    Raises:
+        InputError: it is from a file, and its law was written by hand and has no definition.
+    """
+    made = run._making
+    if made is None:
+        raise InputError(
+            f"{what}: a loop that was loaded knows its law only by a definition, and this one has none; run closed_loop again"
+        )
+    return made
 
 
 @overload
@@ -410,7 +420,7 @@ def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, di
     flat = np.ascontiguousarray(states.reshape(-1, inner))
     made = kernel.batch(flat, **{name: given[name] for name in names}, threads=run.threads)
     values = {port.name: v.reshape(*shape, *v.shape[1:]) for port, v in zip(kernel.outputs, made, strict=True)}
-    return values, values.pop("u"), moves
+    return values, values.pop(kernel.outputs[-1].name), moves
 
 
 def _repeated(port: Port, values: Array, times: int) -> Array:

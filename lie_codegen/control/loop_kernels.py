@@ -128,7 +128,7 @@ def loop_sample(loop: Loop, name: str = "loop_sample") -> Kernel:
 
 @kernel_factory()
 def loop_outputs(loop: Loop, name: str = "loop_outputs") -> Kernel:
-    """(state, t, h, X_d, xi_d, xi_d_dot, numbers) -> the outputs of the law at a state, and `u`, its command within the limits."""
+    """(state, t, h, X_d, xi_d, xi_d_dot, numbers) -> the outputs of the law at a state, and last its command within the limits."""
     extent, law = loop.extent(sampled=False), loop.law
     if law is None:
         raise ValueError("a loop without a law has no outputs")
@@ -141,9 +141,11 @@ def loop_outputs(loop: Loop, name: str = "loop_outputs") -> Kernel:
         return *(values[port.name] for port in law.kernel.outputs), limited(ops, loop, values[COMMAND], numbers)
 
     made = _kernel(loop, name, extent, loop.reference_ports(stages=1), body, law.kernel.formula)
+    # a law may call its own command u
+    name_of_acting = "u_acting" if any(port.name == "u" for port in (*made.inputs, *law.kernel.outputs)) else "u"
     outputs = (
         *law.kernel.outputs,
-        Port("u", law.command.shape, law.command.units, description="the command, within limits"),
+        Port(name_of_acting, law.command.shape, law.command.units, description="the command, within limits"),
     )
     return Kernel(made.name, made.namespace, made.inputs, outputs, body, made.formula, made.source, made.sampler)
 
