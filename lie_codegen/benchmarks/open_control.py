@@ -10,7 +10,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ import casadi as ca
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.benchmarks.open_crocoddyl import HOVER as ROTOR_HOVER
+from lie_codegen.benchmarks.open_crocoddyl import crocoddyl_solver, rotors
 from lie_codegen.benchmarks.open_quadrotor import HOVER, INTERVALS, STEP, Tasks, program, quadrotor, tasks
 from lie_codegen.errors import CompileError
 from lie_codegen.runtime.compiler import compile_library, find_compilers
@@ -26,6 +28,8 @@ from lie_codegen.steering.plan import Status
 
 _NEAR = 1e-4
 _GOOD = 1.01
+#: Solutions of the body on rotors, of which the quickest counts; the first is not.
+_TIMES = 21
 #: A peer's solution: controls are not compared, cost and violation are.
 Outcome = tuple[float, float, float]
 
@@ -55,7 +59,7 @@ class ControlRow:
 
 
 def bench_control(count: int = 20, seed: int = 0, say: Callable[[str], None] = lambda line: None) -> list[ControlRow]:
-    """A row for each solver, ours first, and ours in the loop last."""
+    """A row for each solver, ours first, then ours in the loop, then the body on rotors: ours and crocoddyl's."""
     given = tasks(count, seed)
     outcomes: dict[str, list[Outcome]] = {}
     notes: dict[str, str] = {}
@@ -84,7 +88,7 @@ def bench_control(count: int = 20, seed: int = 0, say: Callable[[str], None] = l
     ours = np.array([ms for _, _, ms in outcomes["lie_codegen, one start"]])
     rows = [_row(name, outcomes[name], iterations[name], best, ours) for name in outcomes]
     rows += [ControlRow(name, note=note) for name, note in notes.items()]
-    return [*rows, _loop_row(given)]
+    return [*rows, _loop_row(given), *_rotor_rows(say)]
 
 
 def table(rows: Sequence[ControlRow]) -> str:
@@ -183,3 +187,44 @@ def _loop_row(given: Tasks) -> ControlRow:
         f"lie_codegen, a sample of {STEP * 1e3:g} ms", len(ms), len(ms), len(ms), float(np.median(ms)),
         float(np.percentile(ms, 95)), float("nan"), 1.0,
     )  # fmt: skip
+
+
+def _rotor_rows(say: Callable[[str], None]) -> list[ControlRow]:
+    """The body on rotors: a solution of ours, an iteration of ours, and crocoddyl's of both, minima of processor time in turn."""
+    names = ("lie_codegen, rotors", "crocoddyl box-FDDP, rotors")
+    say(names[1])
+    problem = rotors()
+
+    def ours() -> tuple[float, int]:
+        plan = problem.solve(guess=np.full(4, ROTOR_HOVER), threads=1, curvature=False)
+        return plan.cost, plan.iterations
+
+    try:
+        peer = crocoddyl_solver()
+    except ImportError as error:
+        return [_least(names[0], [_timed(ours) for _ in range(_TIMES)]), ControlRow(names[1], note=str(error))]
+
+    def theirs() -> tuple[float, int]:
+        solver = peer()
+        return float(solver.cost), int(solver.iter) + 1
+
+    pairs = [(_timed(ours), _timed(theirs)) for _ in range(_TIMES)]
+    rows = [_least(names[i], [pair[i] for pair in pairs]) for i in (0, 1)]
+    first = rows[0].median_ms
+    rows = [replace(row, over_ours=row.median_ms / first) for row in rows]
+    each = [row.median_ms / row.iterations for row in rows]
+    ratio = each[1] / each[0]
+    return [*rows, ControlRow("an iteration of the two", note=f"{each[0]:.3f} and {each[1]:.3f} ms: {ratio:.1f} times")]
+
+
+def _timed(solve: Callable[[], tuple[float, int]]) -> tuple[float, int, float]:
+    """Cost, iterations, milliseconds of processor time."""
+    began = time.process_time()
+    cost, iterations = solve()
+    return cost, iterations, 1e3 * (time.process_time() - began)
+
+
+def _least(name: str, found: Sequence[tuple[float, int, float]]) -> ControlRow:
+    ms = np.array([each[2] for each in found[1:]])
+    steps = float(found[0][1])
+    return ControlRow(name, 1, 1, 1, float(np.min(ms)), float(np.percentile(ms, 95)), float("nan"), steps)
