@@ -1,4 +1,4 @@
-"""The page of an average: the system and its average side by side, for any amplitude on a slider."""
+"""The page of an average: the system and its average side by side, for any amplitude and phase on sliders."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def average_scene(averaged: Averaged, samples: int) -> Scene:
     }  # fmt: skip
     return Scene(
         f"{group.name}: an average of order {averaged.order}",
-        "The system X' = eps X hat(u(t)) and its average; the page integrates both for the amplitude on the slider.",
+        "The system X' = eps X hat(u(t)) and its average; the page integrates both for the amplitude and the phase on the sliders.",
         t,
         [motion, motion_of(group, mean)],
         [

@@ -44,8 +44,8 @@ def view(
     scheme, turns by drag, arrow keys and touch, and its numbers are those of Python to the last bit.
 
     Args:
-        what: a Plan, a Trajectory, a ClosedLoop (give `group`), or an average of `lc.average` (its amplitude becomes a slider, and the
-            page integrates the system itself). Of several runs the first one.
+        what: a Plan, a Trajectory, a ClosedLoop (give `group`), or an average of `lc.average` (its amplitude and phase become sliders, and
+            the page integrates the system itself). Of several runs the first one.
         path: the file.
         group: that of a ClosedLoop.
         body: "box", "satellite", "vehicle", "car", "arrow", or a glTF file (.gltf with its buffers inside, or .glb).

@@ -184,19 +184,23 @@ def test_the_page_of_an_average_integrates_as_python_does(tmp_path: Path, tab: A
     u = lc.PeriodicInput(texts)
     average = lc.average(name, u, order=3)
     tab.goto(lc.view(average, tmp_path / "a.html").as_uri())
-    eps = 0.1
-    found = tab.evaluate(
-        f"(() => {{ const s = lieAverage.states({eps}); return [s.actual.at(-1), s.mean.at(-1), s.h]; }})()"
-    )
-    T = 12 * 2 * np.pi
-    actual, mean = lc.simulate(name, u, t=[0, T], eps=eps, rtol=1e-12).X[-1], average.state(eps, np.array([T]))[0]
-    if name == "su2":
-        group = lc.group(name)
-        actual, mean = (
-            np.stack([group.vee(X @ b @ np.linalg.inv(X)) for b in group.basis], axis=1) for X in (actual, mean)
-        )
-    assert np.max(np.abs(np.array(found[0]) - actual)) < 1e-7  # 64 steps a period of a method of order 4
-    assert np.max(np.abs(np.array(found[1]) - mean)) < 1e-12
+    eps, group = 0.1, lc.group(name)
+    for phase in (0, 17):
+        call = f"(() => {{ const s = lieAverage.states({eps}, {phase}); return [s.actual.at(-1), s.mean.at(-1)]; }})()"
+        found = tab.evaluate(call)
+        first, last = 2 * np.pi * phase / 64, 2 * np.pi * phase / 64 + 12 * 2 * np.pi
+        # from the identity at the phase: Phi(first)^-1 Phi(last) of the flow Phi from 0
+        flow = lc.simulate(name, u, t=[0, first, last] if phase else [0, last], eps=eps, rtol=1e-12).X
+        actual = np.linalg.solve(flow[-2], flow[-1])
+        mean = np.linalg.solve(*average.state(eps, np.array([first, last])))
+        if name == "su2":
+            actual, mean = (
+                np.stack([group.vee(X @ b @ np.linalg.inv(X)) for b in group.basis], axis=1) for X in (actual, mean)
+            )
+        assert np.max(np.abs(np.array(found[0]) - actual)) < 1e-7  # 64 steps a period of a method of order 4
+        assert np.max(np.abs(np.array(found[1]) - mean)) < 1e-12
+    tab.locator("#phase").fill("16")
+    assert tab.locator("#phase_now").inner_text() == "90\u00b0"
     tab.locator("#eps").fill("0.4")
     assert tab.locator("#eps_now").inner_text() == "0.40"
 
