@@ -131,6 +131,7 @@ typedef struct {
     V radius;    /* the same, neither bounded below nor above */
     V graded;    /* 1: the error in coordinates so scaled (small targets), 0: in the entries of X */
     V floor;     /* the square of the graded error that rounding leaves */
+    struct workspace *space;
 } problem;
 
 /* Sets one lane to the size r. */
@@ -164,6 +165,31 @@ typedef struct {
     V H[N * N];  /* Gauss-Newton matrix, lower triangle */
     V xi[N][N];  /* xi[c]: vee(X^-1 dX(1) / dp_c) */
 } point;
+
+/* Extremals found for one target, the cheapest first, and the target's size. */
+typedef struct {
+    int count;
+    int ended[KEPT]; /* starts that ended there */
+    int loose[KEPT]; /* 1: near the target, but not on it: a long valley, or a dead end */
+    double energy[KEPT];
+    double p[KEPT][N];
+    double size;
+} candidates;
+
+/* All that is large: the caller's, or on the stack of the function that is called. */
+typedef struct workspace {
+    union {
+        V mu[MOST_NODES + 1][N];            /* of an extremal, while its end is differentiated */
+        V column[2 * SEED_STEPS + 1][N][N]; /* costates along a path of given controls, before that */
+    } along;
+    V u[2 * SEED_STEPS + 1][M];      /* a first guess */
+    V change[2 * SEED_STEPS + 1][M]; /* of it, by relaxing */
+    point at, next;
+    candidates list[LANES];
+} workspace;
+
+/* The header's size holds it wherever the memory begins; a negative size does not compile. */
+typedef char workspace_has_room[STEERING_WORKSPACE >= sizeof(workspace) + sizeof(V) ? 1 : -1];
 
 /*
  * s = -(H + lambda D)^-1 g by L D L^T; D is the mean of H's diagonal (Levenberg), which finds the global minimum of a large
@@ -209,7 +235,7 @@ static void damped_step(const V *H, const V *g, const V *lambda, int scaled, V *
 /* X(1) and xi of the extremal of p: `steps` Runge-Kutta steps for mu and X, half as many for the sensitivities. */
 static void tangent(const problem *task, int steps, const V *p, V *X, V (*xi)[N])
 {
-    V mu[MOST_NODES + 1][N], v[M], psi[N];
+    V(*mu)[N] = task->space->along.mu, v[M], psi[N];
     int i, c, s;
     for (i = 0; i < N; ++i) {
         mu[0][i] = task->column[i] * p[i];
@@ -416,7 +442,7 @@ typedef struct {
  */
 static int descend(const problem *task, const rules *rule, point *at, int *done)
 {
-    point next;
+    point *const next = &task->space->next;
     V lambda, s[N], size, reach, decrease, scale, bound, clip, most, zero;
     K better;
     slopes kind = PLAIN;
@@ -428,7 +454,7 @@ static int descend(const problem *task, const rules *rule, point *at, int *done)
     fill(&zero, 1, 0.0);
     scale = zero;
     most = zero;
-    memset(&next, 0, sizeof next);
+    memset(next, 0, sizeof *next);
     for (iteration = 0;; ++iteration) {
         const int bold = rule->exact != NULL && iteration >= 6 && 4 * iteration < 3 * rule->most;
         double open = 0.0;
@@ -477,19 +503,19 @@ static int descend(const problem *task, const rules *rule, point *at, int *done)
             return iteration + 1;
         }
         for (i = 0; i < N; ++i) {
-            next.p[i] = at->p[i] + scale * s[i];
+            next->p[i] = at->p[i] + scale * s[i];
         }
         /* near the end the last Jacobian serves, but not twice */
         kind = bold ? FINE : rule->exact != NULL && kind != KNOWN && open < 1e-10 ? KNOWN : PLAIN;
         if (kind == KNOWN) {
-            memcpy(next.xi, at->xi, sizeof next.xi);
+            memcpy(next->xi, at->xi, sizeof next->xi);
         }
-        linearise(task, rule->steps, rule->exact, kind, &next);
-        better = LESS(next.F, bold ? bound : at->F);
+        linearise(task, rule->steps, rule->exact, kind, next);
+        better = LESS(next->F, bold ? bound : at->F);
         for (l = 0; l < LANES; ++l) {
-            const double gain = LANE(next.F, l) / LANE(at->F, l);
+            const double gain = LANE(next->F, l) / LANE(at->F, l);
             if (bold) {
-                if (LANE(next.F, l) < LANE(bound, l)) {
+                if (LANE(next->F, l) < LANE(bound, l)) {
                     LANE(clip, l) = fmin(0.3, 1.5 * LANE(clip, l));
                 } else {
                     LANE(clip, l) *= 0.3;
@@ -501,7 +527,7 @@ static int descend(const problem *task, const rules *rule, point *at, int *done)
                 LANE(lambda, l) = fmax(LANE(lambda, l) * 8.0, 1e-8);
             }
         }
-        take(&better, at, &next);
+        take(&better, at, next);
     }
 }
 
@@ -689,7 +715,7 @@ static void normal_equations(const problem *task, V (*u)[M], V (*column)[N][N], 
 /* The p whose extremal's controls are nearest to u. */
 static void nearest_costate(const problem *task, V (*u)[M], V *p)
 {
-    V column[2 * SEED_STEPS + 1][N][N], H[N * N], g[N], lambda;
+    V(*column)[N][N] = task->space->along.column, H[N * N], g[N], lambda;
     costates_along(task, u, column);
     normal_equations(task, u, column, H, g);
     fill(&lambda, 1, 1e-4);
@@ -721,7 +747,7 @@ static void path_along(V (*u)[M], V *X)
  */
 static void relax(const problem *task, int most, V (*u)[M], V *p)
 {
-    V column[2 * SEED_STEPS + 1][N][N], change[2 * SEED_STEPS + 1][M], X[SIZE];
+    V(*column)[N][N] = task->space->along.column, (*change)[M] = task->space->change, X[SIZE];
     V H[N * N], G[N * N], g[N], q[N], z[N], E, lambda, error, step, length;
     V zero = {0.0}, scale = {0.0};
     int iteration, t, c, i, l, open;
@@ -784,16 +810,6 @@ static int even(int steps)
     steps += steps & 1;
     return steps < 2 ? 2 : steps < MOST_NODES ? steps : MOST_NODES;
 }
-
-/* Extremals found for one target, the cheapest first, and the target's size. */
-typedef struct {
-    int count;
-    int ended[KEPT]; /* starts that ended there */
-    int loose[KEPT]; /* 1: near the target, but not on it: a long valley, or a dead end */
-    double energy[KEPT];
-    double p[KEPT][N];
-    double size;
-} candidates;
 
 static double energy_of(const problem *task, const V *p, int l)
 {
@@ -888,9 +904,9 @@ static void begin(problem *task, V *x, candidates *list)
 static void search(problem *task, const steering_options *options, int first, int last, int relaxed, int again,
     candidates *list, steering_result *result)
 {
-    V x[N], u[2 * SEED_STEPS + 1][M];
+    V x[N], (*u)[M] = task->space->u;
     rules rule;
-    point at;
+    point *const at = &task->space->at;
     double size = 0.0;
     int l, i, done[LANES];
     begin(task, x, list);
@@ -904,22 +920,22 @@ static void search(problem *task, const steering_options *options, int first, in
     rule.enough = size * options->search_tolerance;
     rule.near = 1e-2 * size;
     rule.wanted = LANES - LANES / 4;
-    memset(&at, 0, sizeof at);
+    memset(at, 0, sizeof *at);
     for (; first < last || (list->count == 0 && first < 4 * last); first += LANES) {
         area_rule(task, x, first, u);
         if (relaxed || first >= last) {
-            relax(task, RELAXATIONS, u, at.p);
+            relax(task, RELAXATIONS, u, at->p);
         } else {
-            nearest_costate(task, u, at.p);
+            nearest_costate(task, u, at->p);
         }
         rule.scaled = IS_DEEP && (first / 8) % 2 != 0;
-        result->linearisations += descend(task, &rule, &at, done);
+        result->linearisations += descend(task, &rule, at, done);
         for (l = 0; l < LANES && (first + l < last || first >= last); ++l) {
-            const int loose = LANE(at.Z, l) > 1e-6 * size;
+            const int loose = LANE(at->Z, l) > 1e-6 * size;
             ++result->starts;
             if (done[l] && !(loose && again && LANE(task->graded, l) == 0.0)) {
                 ++result->converged;
-                keep(list, energy_of(task, at.p, l), loose, &at, l);
+                keep(list, energy_of(task, at->p, l), loose, at, l);
             }
         }
     }
@@ -935,9 +951,9 @@ static void polish(int count, const double *targets, problem *task, const steeri
     const int each = LANES / count;
     const double near = options->tolerance * options->tolerance;
     rules rule;
-    point at;
+    point *const at = &task->space->at;
     int i, l, c, done, spent, steps = 2, ready[LANES], own[LANES];
-    memset(&at, 0, sizeof at);
+    memset(at, 0, sizeof *at);
     rule.steps = even(options->polish_steps);
     rule.exact = &steps;
     rule.most = options->polish_iterations;
@@ -958,7 +974,7 @@ static void polish(int count, const double *targets, problem *task, const steeri
             open = open || own[l];
             set_size(task, l, from->size);
             for (i = 0; i < N; ++i) {
-                LANE(at.p[i], l) = from->count == 0 ? 0.0 : from->p[own[l] ? which : 0][i];
+                LANE(at->p[i], l) = from->count == 0 ? 0.0 : from->p[own[l] ? which : 0][i];
             }
             for (i = 0; i < SIZE; ++i) {
                 LANE(task->target[i], l) = targets[of * SIZE + i];
@@ -967,12 +983,12 @@ static void polish(int count, const double *targets, problem *task, const steeri
         if (!open) {
             continue;
         }
-        spent = descend(task, &rule, &at, ready);
+        spent = descend(task, &rule, at, ready);
         for (l = 0; l < LANES; ++l) {
             steering_result *result = results + l / each;
-            const double E = LANE(at.E, l), F = LANE(at.F, l);
+            const double E = LANE(at->E, l), F = LANE(at->F, l);
             const int good = E <= near && (E == F || F <= 1e-14 + 1e2 * LANE(task->floor, l));
-            const double energy = energy_of(task, at.p, l);
+            const double energy = energy_of(task, at->p, l);
             if (!own[l]) {
                 continue;
             }
@@ -985,9 +1001,9 @@ static void polish(int count, const double *targets, problem *task, const steeri
                 result->cost = energy;
                 result->residual = sqrt(E);
                 for (i = 0; i < N; ++i) {
-                    result->mu0[i] = LANE(task->column[i], l) * LANE(at.p[i], l);
+                    result->mu0[i] = LANE(task->column[i], l) * LANE(at->p[i], l);
                     for (c = 0; c < N; ++c) {
-                        result->jacobian[i][c] = LANE(at.xi[c][i], l) / LANE(task->column[c], l);
+                        result->jacobian[i][c] = LANE(at->xi[c][i], l) / LANE(task->column[c], l);
                     }
                 }
             }
@@ -1000,13 +1016,14 @@ static void polish(int count, const double *targets, problem *task, const steeri
  * those that are not solved.
  */
 static void solve_some(int count, const double *targets, const double *weights, const steering_options *options,
-    steering_result *results)
+    steering_result *results, workspace *space)
 {
     problem task;
-    candidates list[LANES];
+    candidates *const list = space->list;
     double mean = 1.0, least = HUGE_VAL, largest = 0.0;
     int i, k, c, attempt, open, starts = options->starts;
     memset(&task, 0, sizeof task);
+    task.space = space;
     for (i = 0; i < M; ++i) {
         mean *= pow(weights[i], 1.0 / M);
         least = fmin(least, weights[i]);
@@ -1099,7 +1116,7 @@ static void refuse(steering_result *result)
     result->status = STEERING_INPUT;
 }
 
-void steering_solve(int count, const double *targets, const double weights[M],
+static void solve_all(workspace *space, int count, const double *targets, const double weights[M],
     const steering_options *options, steering_result *results)
 {
     double packed[LANES * SIZE];
@@ -1116,7 +1133,7 @@ void steering_solve(int count, const double *targets, const double weights[M],
             any = any || good;
         }
         if (any) {
-            solve_some(some, packed, weights, options, results + k);
+            solve_some(some, packed, weights, options, results + k, space);
         }
         for (next = 0; next < some; ++next) {
             if (!usable(targets + (ptrdiff_t)(k + next) * FULL_SIZE, weights, options)) {
@@ -1124,6 +1141,21 @@ void steering_solve(int count, const double *targets, const double weights[M],
             }
         }
     }
+}
+
+void steering_solve(int count, const double *targets, const double weights[M],
+    const steering_options *options, steering_result *results)
+{
+    workspace space;
+    solve_all(&space, count, targets, weights, options, results);
+}
+
+void steering_solve_in(void *memory, int count, const double *targets, const double weights[M],
+    const steering_options *options, steering_result *results)
+{
+    char *const start = memory;
+    const size_t past = (size_t)((uintptr_t)start % sizeof(V)); /* vectors begin at multiples of their size */
+    solve_all((workspace *)(void *)(start + (past ? sizeof(V) - past : 0)), count, targets, weights, options, results);
 }
 
 void steering_sample(const double mu0[N], const double weights[M], int count, double *u,

@@ -17,7 +17,7 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.shooting.lie_poisson import transport
 from lie_codegen.steering.shooting.source import PROBLEM, SteeringView, render_steering, steering_view
-from lie_codegen.steering.shooting.stack import LANES, stack_bytes
+from lie_codegen.steering.shooting.stack import LANES, stack_bytes, workspace_bytes
 
 _VECTORS = 8
 _STEPS, _ROWS = 8, 8
@@ -59,8 +59,17 @@ def render_steering_package(group: MatrixGroup, controls: Sequence[str | int], f
         }
         for vector in vectors
     ]
-    stack = {"lanes": stack_bytes(view, LANES), "one": stack_bytes(view, 1)}
-    context = {"view": view, "vectors": shown, "example": _example(group), "duration": _DURATION, "stack": stack}
+    sizes = (("lanes", LANES), ("one", 1))
+    stack = {name: stack_bytes(view, lanes) for name, lanes in sizes}
+    stack |= {f"small_{name}": stack_bytes(view, lanes, in_workspace=True) for name, lanes in sizes}
+    context = {
+        "view": view,
+        "vectors": shown,
+        "example": _example(group),
+        "duration": _DURATION,
+        "stack": stack,
+        "workspace": {name: workspace_bytes(view, lanes) for name, lanes in sizes},
+    }
     tree = {
         f"include/{view.prefix}.h": sources[f"{view.prefix}.h"],
         f"src/{view.prefix}.c": sources[f"{view.prefix}.c"],

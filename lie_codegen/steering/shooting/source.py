@@ -20,6 +20,8 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.shooting.bracket_lengths import bracket_lengths
 from lie_codegen.steering.shooting.defaults import Defaults
 from lie_codegen.steering.shooting.lie_poisson import shooting_kernels
+from lie_codegen.steering.shooting.stack import LANES as VECTOR
+from lie_codegen.steering.shooting.stack import workspace_bytes
 
 #: A vector of doubles, one start a lane.
 LANES = Target("V", {op: C99_FORMS[op] for op in ("ADD", "SUB", "MUL", "DIV", "NEG", "INV", "TWICE", "SQ")}, c_literal)
@@ -128,8 +130,9 @@ def loop_areas(group: MatrixGroup, controls: Sequence[int]) -> tuple[tuple[tuple
 
 def render_steering(view: SteeringView) -> dict[str, str]:
     """The header of the solver, what it solves, and its source, the same for every group: {file name: text}."""
+    workspace = {"lanes": workspace_bytes(view, VECTOR), "one": workspace_bytes(view, 1)}
     return {
-        f"{view.prefix}.h": render("steering_header.h.jinja", view=view),
+        f"{view.prefix}.h": render("steering_header.h.jinja", view=view, workspace=workspace),
         PROBLEM: render("steering_problem.h.jinja", view=view),
         f"{view.prefix}.c": (template_folder() / "steering_core.c").read_text(encoding="utf-8"),
     }
