@@ -22,6 +22,7 @@ def generate(
     extra: Mapping[str, str] | None = None,
     real: str = "double",
     target: str = "c",
+    starts: Mapping[str, Mapping[str, tuple[float, ...]]] | None = None,
 ) -> Path:
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
@@ -33,13 +34,14 @@ def generate(
         extra: further files of the package, {path: text}.
         real: "double", or "float" for processors that have no double; the formulas are the same.
         target: what surrounds the C, see `lie_codegen.codegen.targets`.
+        starts: {symbol: {port: numbers}} at which a unit of such a function starts; its first test vector where none is given.
 
     Raises:
         CodegenError: a kernel cannot become C, two symbols collide, or a constant is beyond the range of float.
         IdentifierError: the namespace is no C identifier.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    tree = render_package(namespace, kernels, _metadata(metadata), extra, real)
+    tree = render_package(namespace, kernels, _metadata(metadata), extra, real, starts)
     return write_package(with_target(tree, target, real), folder)
 
 

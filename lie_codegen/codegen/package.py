@@ -50,8 +50,11 @@ def render_package(
     metadata: PackageMetadata | None = None,
     extra: Mapping[str, str] | None = None,
     real: str = "double",
+    starts: Mapping[str, Mapping[str, tuple[float, ...]]] | None = None,
 ) -> dict[str, str]:
     """The package as {path: text}, in double or float, with `extra` files of the same form; writes nothing.
+
+    `starts`: {symbol: {port: numbers}}, told in the manifest.
 
     Raises:
         CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
@@ -84,7 +87,7 @@ def render_package(
         "README.md": render("README.md.jinja", package=view, **files),
         **(extra or {}),
     }
-    return {**tree, "manifest.json": _manifest(view, kernels, tree)}
+    return {**tree, "manifest.json": _manifest(view, kernels, tree, starts or {})}
 
 
 def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
@@ -178,20 +181,26 @@ def _csv_rows(kernels: Sequence[Kernel], vectors: Sequence[Sequence[TestVector]]
     ]
 
 
-def _function(kernel: Kernel) -> dict[str, Any]:
-    """The signature, and the definition where a number is compiled in."""
+def _function(kernel: Kernel, start: Mapping[str, tuple[float, ...]] | None) -> dict[str, Any]:
+    """The signature, and the definition where a number is compiled in, and where a unit of it starts."""
     own = {"definition": kernel.definition} if described(kernel.definition) else {}
-    return {**Signature.of(kernel).to_json(), **own}
+    begin = {"start": {port: list(numbers) for port, numbers in start.items()}} if start else {}
+    return {**Signature.of(kernel).to_json(), **own, **begin}
 
 
-def _manifest(view: PackageView, kernels: Sequence[Kernel], tree: Mapping[str, str]) -> str:
+def _manifest(
+    view: PackageView,
+    kernels: Sequence[Kernel],
+    tree: Mapping[str, str],
+    starts: Mapping[str, Mapping[str, tuple[float, ...]]],
+) -> str:
     data: dict[str, Any] = {
         "generator": GENERATOR,
         "format": 1,
         "namespace": view.namespace,
         "version": view.version,
         **({"real": view.type_name} if view.type_name != "double" else {}),
-        "functions": [_function(kernel) for kernel in kernels],
+        "functions": [_function(kernel, starts.get(kernel.symbol)) for kernel in kernels],
         "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
     }
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"

@@ -15,11 +15,13 @@ class PackageParts:
     namespace: the name of a package of this alone.
     kernels: what is printed as functions.
     files: {path: text}; src/*.c and include/*.h join the library, *.c beside them are programs that test themselves.
+    starts: {symbol: {port: numbers}}: where a function that steps begins, for units that other programs step.
     """
 
     namespace: str
     kernels: tuple[Kernel, ...]
     files: Mapping[str, str] = field(default_factory=dict)
+    starts: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
 
 
 @runtime_checkable

@@ -17,7 +17,7 @@ import sysconfig
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +88,7 @@ class _Function:
     outputs: Sequence[_Port]
     vectors: Sequence[_Vector]
     tunable: frozenset[str]
+    start: Mapping[str, list[str]]
 
     @property
     def rust(self) -> str:
@@ -147,13 +148,11 @@ def _functions(manifest: Mapping[str, Any], tree: Mapping[str, str]) -> list[_Fu
             for case in vectors.get(each["symbol"], [])
         ]
         formula = " ".join(str(each.get("formula") or each["name"]).split())
-        found.append(_Function(each["name"], each["symbol"], formula, inputs, outputs, cases, tunable))
+        start = {port.name: values for port, values in cases[0].inputs} if cases else {}
+        start |= {port: [repr(float(number)) for number in numbers] for port, numbers in each.get("start", {}).items()}
+        found.append(_Function(each["name"], each["symbol"], formula, inputs, outputs, cases, tunable, start))
     names = [each.name for each in found]
-    return [each if names.count(each.name) == 1 else _Function(each.symbol, *_rest(each)) for each in found]
-
-
-def _rest(function: _Function) -> tuple[Any, ...]:
-    return (function.symbol, function.formula, function.inputs, function.outputs, function.vectors, function.tunable)
+    return [each if names.count(each.name) == 1 else replace(each, name=each.symbol) for each in found]
 
 
 def _port(record: Mapping[str, Any]) -> _Port:
@@ -207,9 +206,7 @@ def _with_floats(function: _Function) -> _Function:
         return [(port, [x if set(x) & set(".einf") else f"{x}.0" for x in values]) for port, values in pairs]
 
     vectors = [_Vector(floats(each.inputs), floats(each.outputs)) for each in function.vectors]
-    return _Function(
-        function.name, function.symbol, function.formula, function.inputs, function.outputs, vectors, function.tunable
-    )
+    return replace(function, vectors=vectors)
 
 
 def _ros2(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dict[str, str]:
@@ -280,7 +277,6 @@ def _fmu(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dic
     at = 0
     for function in shown:
         prefix = f"{function.name}." if len(shown) > 1 else ""
-        start = {port.name: values for port, values in function.vectors[0].inputs} if function.vectors else {}
         states = (
             {p.name.removesuffix("_next") for p in function.outputs if p.name.endswith("_next")}
             if function.is_step
@@ -305,7 +301,7 @@ def _fmu(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dic
                         len(variables) + 1,
                         port,
                         at,
-                        start.get(port.name),
+                        function.start.get(port.name),
                         "output" if state else "parameter" if tuned else "input",
                     )
                 )

@@ -64,9 +64,23 @@ def loop_parts(run: Run, reference: Any, parts: int, name: str | None, real: str
         moving = [curve_kernel(reference) if isinstance(reference, CurveReference) else reference_kernel(reference)]
     own = [loop_control(loop), loop_motion(loop)] if sampled else [loop_step(loop)]
     view = _view(quiet, parts, package, real, own, moving)
-    return PackageParts(
-        package, (*kernels, *moving, *own), {f"{package}_loop.c": render("loop_replay.c.jinja", loop=view)}
-    )
+    files = {f"{package}_loop.c": render("loop_replay.c.jinja", loop=view)}
+    return PackageParts(package, (*kernels, *moving, *own), files, {each.symbol: _start(quiet, each) for each in own})
+
+
+def _start(run: Run, kernel: Kernel) -> dict[str, tuple[float, ...]]:
+    """State, time and numbers at the first instant, a state's places beyond those of the plant at rest."""
+    found = {}
+    for port in kernel.inputs:
+        if port.name == "state":
+            state = np.zeros(port.size)
+            state[: run.start.shape[1]] = run.start[0]
+            found["state"] = tuple(state.tolist())
+        elif port.name == "t":
+            found["t"] = (float(run.times[0]),)
+        elif port.name in run.numbers:
+            found[port.name] = tuple(np.ravel(run.numbers[port.name]).tolist())
+    return found
 
 
 def _quiet(run: Run) -> Run:

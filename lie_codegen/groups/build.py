@@ -146,8 +146,9 @@ def generate(
     alone = groups[0] if len(groups) == 1 and all(kernel.namespace == groups[0].name for kernel in kernels) else None
     namespace = parts[0].namespace if parts and name is None else _package_name(kernels, name)
     metadata = None if alone is None else _metadata(alone)
+    starts = {symbol: ports for each in parts for symbol, ports in each.starts.items()}
     written = generate_package(
-        kernels, folder, namespace=namespace, metadata=metadata, extra=extra, real=real, target=target
+        kernels, folder, namespace=namespace, metadata=metadata, extra=extra, real=real, target=target, starts=starts
     )
     if target == "fmu":
         pack_fmu(written, [each.command for each in find_compilers()])

@@ -19,7 +19,7 @@ from lie_codegen.codegen.package import render_library, render_package
 from lie_codegen.codegen.templates import environment, template_folder
 from lie_codegen.codegen.views import PackageMetadata, comment_lines
 from lie_codegen.codegen.write import write_package
-from lie_codegen.errors import CodegenError, IdentifierError, OutputFolderError
+from lie_codegen.errors import CodegenError, IdentifierError, OutputFolderError, SystemRefusalError
 from lie_codegen.kernel.kernel import Kernel, Port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -250,7 +250,7 @@ def test_an_empty_folder_is_welcome_and_a_failed_write_leaves_it(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
-        with pytest.raises(OutputFolderError, match="No space left"):
+        with pytest.raises(SystemRefusalError, match="No space left"):
             write_package(tree, target)
     assert [path.name for path in tmp_path.iterdir()] == ["empty"]
     assert (write_package(tree, target) / "src/toy.c").is_file()
