@@ -4,34 +4,95 @@
 
 /* ---- matrices: real parts, then imaginary ones, ROWS x SIZE each; below are zeros ---- */
 
-/* z = x y; y's rows from ROWS on are zero. */
+/* One entry of z = x y; y's rows from ROWS on are zero. */
+static inline void entry(const V *x, const V *y, V *z, int i, int j)
+{
+    V re = x[i * SIZE] * y[j];
+#if PARTS == 2
+    V im = x[i * SIZE] * y[MATRIX / 2 + j] + x[MATRIX / 2 + i * SIZE] * y[j];
+    re -= x[MATRIX / 2 + i * SIZE] * y[MATRIX / 2 + j];
+#endif
+    for (int m = 1; m < ROWS; ++m) {
+        re += x[i * SIZE + m] * y[m * SIZE + j];
+#if PARTS == 2
+        re -= x[MATRIX / 2 + i * SIZE + m] * y[MATRIX / 2 + m * SIZE + j];
+        im += x[i * SIZE + m] * y[MATRIX / 2 + m * SIZE + j];
+        im += x[MATRIX / 2 + i * SIZE + m] * y[m * SIZE + j];
+#endif
+    }
+    z[i * SIZE + j] = re;
+#if PARTS == 2
+    z[MATRIX / 2 + i * SIZE + j] = im;
+#endif
+}
+
+#if MATRIX > 32 && PARTS == 2
+/* Four entries at once, two rows by two columns: what is loaded is used twice, and eight sums do not wait for each other. */
+static inline void four_entries(const V *x, const V *y, V *z, int i, int j)
+{
+    const V *const p = x + i * SIZE, *const q = p + SIZE;
+    V re00 = splat(0.0), re01 = re00, re10 = re00, re11 = re00, im00 = re00, im01 = re00, im10 = re00, im11 = re00;
+    for (int m = 0; m < ROWS; ++m) {
+        const V *const u = y + m * SIZE + j;
+        const V a = p[m], b = q[m], ai = p[MATRIX / 2 + m], bi = q[MATRIX / 2 + m];
+        const V c = u[0], d = u[1], ci = u[MATRIX / 2], di = u[MATRIX / 2 + 1];
+        re00 += a * c;
+        re01 += a * d;
+        re10 += b * c;
+        re11 += b * d;
+        im00 += a * ci;
+        im01 += a * di;
+        im10 += b * ci;
+        im11 += b * di;
+        re00 -= ai * ci;
+        re01 -= ai * di;
+        re10 -= bi * ci;
+        re11 -= bi * di;
+        im00 += ai * c;
+        im01 += ai * d;
+        im10 += bi * c;
+        im11 += bi * d;
+    }
+    z += i * SIZE + j;
+    z[0] = re00;
+    z[1] = re01;
+    z[SIZE] = re10;
+    z[SIZE + 1] = re11;
+    z += MATRIX / 2;
+    z[0] = im00;
+    z[1] = im01;
+    z[SIZE] = im10;
+    z[SIZE + 1] = im11;
+}
+
+/* z = x y. */
+static __attribute__((noinline)) void multiply(const V *x, const V *y, V *z)
+{
+    for (int i = 0; i + 1 < ROWS; i += 2) {
+        for (int j = 0; j + 1 < SIZE; j += 2) {
+            four_entries(x, y, z, i, j);
+        }
+        if (SIZE % 2) {
+            entry(x, y, z, i, SIZE - 1);
+            entry(x, y, z, i + 1, SIZE - 1);
+        }
+    }
+    if (ROWS % 2) {
+        EACH(j, SIZE) { entry(x, y, z, ROWS - 1, j); }
+    }
+}
+#else
+/* z = x y. */
 #if MATRIX > 16
 __attribute__((noinline))
 #endif
 static void multiply(const V *x, const V *y, V *z)
 {
     EACH(i, ROWS) {
-        EACH(j, SIZE) {
-            V re = x[i * SIZE] * y[j];
-#if PARTS == 2
-            V im = x[i * SIZE] * y[MATRIX / 2 + j] + x[MATRIX / 2 + i * SIZE] * y[j];
-            re -= x[MATRIX / 2 + i * SIZE] * y[MATRIX / 2 + j];
-#endif
-            for (int m = 1; m < ROWS; ++m) {
-                re += x[i * SIZE + m] * y[m * SIZE + j];
-#if PARTS == 2
-                re -= x[MATRIX / 2 + i * SIZE + m] * y[MATRIX / 2 + m * SIZE + j];
-                im += x[i * SIZE + m] * y[MATRIX / 2 + m * SIZE + j];
-                im += x[MATRIX / 2 + i * SIZE + m] * y[m * SIZE + j];
-#endif
-            }
-            z[i * SIZE + j] = re;
-#if PARTS == 2
-            z[MATRIX / 2 + i * SIZE + j] = im;
-#endif
-        }
+        EACH(j, SIZE) { entry(x, y, z, i, j); }
     }
 }
+#endif
 
 #if !COORDINATES
 /* [x, y]; of skew-Hermitian matrices y x = (x y)^H, so that one product is enough. */

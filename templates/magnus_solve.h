@@ -7,7 +7,7 @@ enum { REACHED = 0, TOO_MANY_AT_FIRST = 1, TOO_MANY = 2, NOT_FINITE = 3, LONG = 
 typedef struct {
     Input u;
     ptrdiff_t pieces;                 /* of u; their ends are u.times */
-    const double *gram;               /* DIM x DIM: x' gram x = |hat(x)|^2 */
+    const double *norms;              /* DIM x DIM: x' norms x = |hat(x)|_F^2; then DIM: |A_i|_2 */
     const double *times;              /* of the states that are wanted, the first that of X0 */
     const double *X0;
     ptrdiff_t count, order, most, block; /* times; steps that may be taken; steps from which Python is to lead */
@@ -19,13 +19,16 @@ typedef struct {
     double estimate, longest, shortest;
 } Solve;
 
-static double size_of(const double *gram, const double *x)
+/* A bound of |hat(x)|_2: the Frobenius norm, or the sum of those of its terms; of large matrices with few terms that is much less. */
+static double size_of(const double *norms, const double *x)
 {
-    double sum = 0.0;
+    double square = 0.0, sum = 0.0;
     EACH(i, DIM) {
-        EACH(j, DIM) { sum += x[i] * gram[i * DIM + j] * x[j]; }
+        EACH(j, DIM) { square += x[i] * norms[i * DIM + j] * x[j]; }
+        sum += fabs(x[i]) * norms[DIM * DIM + i];
     }
-    return sqrt(sum > 0.0 ? sum : 0.0);
+    square = sqrt(square > 0.0 ? square : 0.0);
+    return sum < square ? sum : square;
 }
 
 static double larger(double a, double b)
@@ -34,7 +37,7 @@ static double larger(double a, double b)
 }
 
 /*
- * Steps per unit of time that piece k asks for: one radian of the fastest sine, and |h hat(u)| <= 1 in the Frobenius norm, well
+ * Steps per unit of time that piece k asks for: one radian of the fastest sine, and |h hat(u)| <= 1, well
  * inside the radius pi in which the Magnus series converges.
  */
 static double density(const Solve *s, double waves, double fastest, ptrdiff_t k)
@@ -42,10 +45,10 @@ static double density(const Solve *s, double waves, double fastest, ptrdiff_t k)
     const Input *u = &s->u;
     double total = waves;
     for (ptrdiff_t j = 0; j < u->terms; ++j) {
-        total += size_of(s->gram, u->series + (k * u->terms + j) * DIM);
+        total += size_of(s->norms, u->series + (k * u->terms + j) * DIM);
     }
     if (!u->terms && s->pieces) {
-        total += larger(size_of(s->gram, u->left + k * DIM), size_of(s->gram, u->right + k * DIM));
+        total += larger(size_of(s->norms, u->left + k * DIM), size_of(s->norms, u->right + k * DIM));
     }
     return larger(fabs(u->factor[0]) * total, fastest);
 }
@@ -58,7 +61,7 @@ static ptrdiff_t plan(Solve *s)
     ptrdiff_t k = 0, next = 1;
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
         const double *x = u->cosines + f * DIM, *y = u->sines + f * DIM;
-        const double c = size_of(s->gram, x), d = size_of(s->gram, y), both = sqrt(c * c + d * d);
+        const double c = size_of(s->norms, x), d = size_of(s->norms, y), both = sqrt(c * c + d * d);
         waves += both;
         fastest = both != 0.0 ? larger(fabs(u->rate[f]), fastest) : fastest;
     }

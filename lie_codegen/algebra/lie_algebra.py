@@ -52,9 +52,18 @@ class LieAlgebra:
         self._check_jacobi()
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # Groups are the keys of what is compiled, in every call; the table of su(8) alone takes a millisecond.
         return hash(
             (self.name, self.labels, frozenset((key, frozenset(row.items())) for key, row in self.table.items()))
         )
+
+    def __getstate__(self) -> dict[str, object]:
+        # Without the hash: that of a text is another one in another process.
+        return {"name": self.name, "labels": self.labels, "table": self.table}
 
     @property
     def dim(self) -> int:

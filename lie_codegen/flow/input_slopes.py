@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.flow.magnus.norms import gram_of
 from lie_codegen.flow.magnus.reverse import pullback
-from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.tangents import NODES
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.signals.parametric_input import ParametricInput

@@ -16,8 +16,8 @@ from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.inputs import drive_signal
 from lie_codegen.flow.libraries import step_of
 from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.flow.magnus.norms import norms_of
 from lie_codegen.flow.magnus.run import MOST_STEPS, flow, magnus_run
-from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.flow.refined import refined
 from lie_codegen.flow.restarts import Chart, restarted_charts
@@ -99,7 +99,7 @@ class Trajectory(Saved):
         """X at the times after the first, from X = start there."""
         if not self.multiple:
             return magnus_run(self.group, self.drive, times, start, order=8, rtol=self.rtol).X
-        steps = plan_steps(self.drive, gram_of(self.group), times, MOST_STEPS)
+        steps = plan_steps(self.drive, norms_of(self.group), times, MOST_STEPS)
         if steps is None:
             raise InputError(f"Trajectory.at({self.group.name}): the run has too many steps")
         return flow(self.group, self.drive, steps.times(self.multiple), int(self.method[-1]), start)

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -208,3 +213,15 @@ def test_brackets_alone_find_a_faithful_representation() -> None:
 def test_an_abelian_algebra_from_no_brackets() -> None:
     group = lc.from_brackets("flat", ["a", "b"], {})
     assert np.linalg.matrix_rank(group.basis.reshape(2, -1)) == 2
+
+
+def test_a_pickled_algebra_has_the_hash_of_its_process() -> None:
+    """The hash is kept, but texts hash differently in every process."""
+    algebra = lc.group("so3").algebra
+    hash(algebra)
+    code = (
+        f"import pickle, lie_codegen as lc; there = pickle.loads({pickle.dumps(algebra)!r}); here = lc.group('so3').algebra; "
+        "assert there == here and hash(there) == hash(here)"
+    )
+    for seed in ("1", "2"):
+        subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": seed})

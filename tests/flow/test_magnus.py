@@ -10,8 +10,8 @@ from scipy.linalg import expm
 import lie_codegen as lc
 from lie_codegen.errors import ComputationError, ExpressionError, InputError, NotFiniteError
 from lie_codegen.flow.magnus import numpy_steps
+from lie_codegen.flow.magnus.norms import norms_of, size_of
 from lie_codegen.flow.magnus.run import flow
-from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.runtime.formula_input import fourier_input
 
@@ -53,7 +53,7 @@ def test_the_compiled_steps_are_those_of_numpy(name: str) -> None:
     group = lc.group(name)
     cosines, sines = waves(group.dim, 2)
     run = lc.simulate(group, fourier_input(RATES, cosines, sines), t=[0.0, 0.31, 1.7], rtol=1e-9)
-    steps = plan_steps(run.drive, gram_of(group), run.t, 10**6)
+    steps = plan_steps(run.drive, norms_of(group), run.t, 10**6)
     kind = complex if group.is_complex else float
     start = expm(group.hat(0.3 * cosines[0])).astype(kind)
     for order in (4, 6, 8):
@@ -279,3 +279,16 @@ def test_a_trajectory_prints_in_a_line() -> None:
     text = repr(lc.simulate(lc.group("so3"), [0.1, 0.2, 0.3], t=[0, 1]))
     assert text.startswith("Trajectory(so3, 2 times from 0 to 1, magnus8")
     assert "\n" not in text
+
+
+@pytest.mark.parametrize("name", ["so3", "se3", "su4", "sl2"])
+def test_steps_are_as_long_as_the_spectral_norm_allows(name: str) -> None:
+    """The bound is one, is no more than the Frobenius norm, and is sharp for one basis element."""
+    group, rng = lc.group(name), np.random.default_rng(4)
+    norms = norms_of(group)
+    for x in [*rng.normal(size=(50, group.dim)), *np.eye(group.dim)]:
+        bound, A = size_of(norms, x), group.hat(x)
+        assert np.linalg.norm(A, 2) <= bound * (1 + 1e-14)
+        assert bound <= np.linalg.norm(A) * (1 + 1e-14)
+        if np.count_nonzero(x) == 1:
+            assert abs(bound - np.linalg.norm(A, 2)) <= 1e-14

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.flow.magnus.norms import size_of
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.signals.resolved_input import ResolvedInput
@@ -78,16 +80,13 @@ class Drive(Saved):
         found = np.searchsorted(self.times, moments, side="right") - 1
         return np.ascontiguousarray(np.clip(found, 0, len(self.times) - 2), dtype=np.intp)
 
-    def density(self, gram: Array, pieces: NDArray[np.intp]) -> Array:
+    def density(self, norms: Array, pieces: NDArray[np.intp]) -> Array:
         """Steps per unit of time that the fastest sine and the size of u ask for, on each of these pieces.
 
-        One radian of the fastest sine, and |h hat(u)| <= 1 in the Frobenius norm: well inside the radius pi in which the
-        Magnus series converges.
+        One radian of the fastest sine, and |h hat(u)| <= 1: well inside the radius pi in which the Magnus series converges.
+        `norms` are those of `norms_of`.
         """
-
-        def size(vectors: Array) -> Array:
-            return np.asarray(np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", vectors, gram, vectors), 0.0)))
-
+        size = partial(size_of, norms)
         factor = float(np.max(np.abs(self.factor)))
         waves = np.hypot(size(self.formula.cosines), size(self.formula.sines))
         total = np.full(len(pieces), float(np.max(np.sum(waves, axis=-1), initial=0.0)))

@@ -9,8 +9,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.flow.events import INNER, Event, EventHits, Function, find_events
 from lie_codegen.flow.magnus import numpy_steps
 from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.flow.magnus.norms import norms_of
 from lie_codegen.flow.magnus.run import MOST_STEPS, flow
-from lie_codegen.flow.magnus.solver import gram_of
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -27,7 +27,7 @@ def run_events(
 ) -> tuple[EventHits, ...]:
     """What is found of the events between the first and the last time, with steps no longer than those of the run."""
     where = f"simulate({group.name})"
-    coarse = plan_steps(drive, gram_of(group), times, MOST_STEPS)
+    coarse = plan_steps(drive, norms_of(group), times, MOST_STEPS)
     widths = np.diff(coarse.knots) / coarse.parts if coarse is not None else np.empty(0)
     if coarse is None:
         return ()
@@ -35,7 +35,7 @@ def run_events(
     multiple = max(1, int(np.ceil(float(np.max(widths)) / longest * (1 - 1e-12))))
     starts, lengths = coarse.times(multiple).moments
     stops = np.append((starts[:, None] + lengths[:, None] * np.concatenate([[0.0], INNER])).ravel(), times[-1])
-    fine = plan_steps(drive, gram_of(group), stops, MOST_STEPS)
+    fine = plan_steps(drive, norms_of(group), stops, MOST_STEPS)
     if fine is None:
         return ()
     X = np.concatenate([start[None], flow(group, drive, fine, order, start)])

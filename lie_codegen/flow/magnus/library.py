@@ -43,7 +43,7 @@ class _Grid(ctypes.Structure):
 
 class Solve(ctypes.Structure):
     _fields_ = [
-        ("u", Input), ("pieces", ctypes.c_ssize_t), *((n, ctypes.c_void_p) for n in ("gram", "times", "X0")),
+        ("u", Input), ("pieces", ctypes.c_ssize_t), *((n, ctypes.c_void_p) for n in ("norms", "times", "X0")),
         *((n, ctypes.c_ssize_t) for n in ("count", "order", "most", "block")), ("rtol", ctypes.c_double), ("atol", ctypes.c_double),
         *((n, ctypes.c_void_p) for n in ("knots", "parts", "first", "piece", "slot", "space", "coarse", "fine", "end")),
         *((n, ctypes.c_ssize_t) for n in ("spans", "multiple", "steps")),

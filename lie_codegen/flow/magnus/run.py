@@ -12,7 +12,8 @@ from lie_codegen.errors import ComputationError
 from lie_codegen.flow.magnus import numpy_steps
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.library import MagnusLibrary, magnus_library
-from lie_codegen.flow.magnus.solver import LONG, REACHED, TOO_MANY, TOO_MANY_AT_FIRST, Solved, Solver, gram_of
+from lie_codegen.flow.magnus.norms import norms_of
+from lie_codegen.flow.magnus.solver import LONG, REACHED, TOO_MANY, TOO_MANY_AT_FIRST, Solved, Solver
 from lie_codegen.flow.magnus.steps import Steps, plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.threads import share_out
@@ -121,7 +122,7 @@ def _led_by_python(
     where: str,
 ) -> MagnusRun:
     """The same loop as magnus_solve.h: for many trajectories, several threads, runs of millions of steps, and without a compiler."""
-    base = plan_steps(drive, gram_of(group), times, most)
+    base = plan_steps(drive, norms_of(group), times, most)
     if base is None:
         raise ComputationError(_TOO_FAST.format(where=where, most=most))
     before, coarse = 1, _finite(flow(group, drive, base, order, X0, threads), where)
@@ -150,7 +151,7 @@ def fixed_run(
     group: MatrixGroup, drive: Drive, times: Array, X0: Array, *, order: int, steps: int, threads: int = 1
 ) -> MagnusRun:
     """So many equal steps between the first and the last time, or the next more that end at every time and jump of u."""
-    planned = plan_steps(drive, np.zeros((group.dim, group.dim)), times, MOST_STEPS)
+    planned = plan_steps(drive, np.zeros((group.dim + 1, group.dim)), times, MOST_STEPS)
     if planned is None:
         raise ComputationError(f"simulate({group.name}): u is not finite")
     widths = np.diff(planned.knots)
@@ -164,7 +165,7 @@ def fixed_run(
 def solver_of(group: MatrixGroup) -> Solver | None:
     """Runs of the group by compiled code; None where there is no compiler."""
     library = magnus_library(group)
-    return None if library is None else Solver(library, gram_of(group))
+    return None if library is None else Solver(library, norms_of(group))
 
 
 def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, threads: int = 1) -> Array:

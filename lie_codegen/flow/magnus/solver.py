@@ -38,7 +38,7 @@ class Solved:
 class SolverTask:
     """Memory for runs with so many times, pieces, rates and terms; one run at a time."""
 
-    def __init__(self, library: MagnusLibrary, gram: Array, count: int, pieces: int, rates: int, terms: int) -> None:
+    def __init__(self, library: MagnusLibrary, norms: Array, count: int, pieces: int, rates: int, terms: int) -> None:
         d, kind = library.group.degree, complex if library.group.is_complex else float
         spans = count + pieces + 1
         self._solve = library.solve
@@ -48,11 +48,11 @@ class SolverTask:
         self.times = np.empty(count)
         self._numbers = np.empty(spans + library.work(rates, terms, count - 1))
         self._counts = np.empty(4 * spans, dtype=np.intp)
-        self._gram = gram
+        self._norms = norms
         self.kept: tuple[Array, ...] = ()
         places = [self._counts.ctypes.data + 8 * spans * k for k in range(4)]
         self.arguments = Solve(
-            pieces=pieces, gram=gram.ctypes.data, times=self.times.ctypes.data, X0=self.X0.ctypes.data, count=count,
+            pieces=pieces, norms=norms.ctypes.data, times=self.times.ctypes.data, X0=self.X0.ctypes.data, count=count,
             knots=self._numbers.ctypes.data, parts=places[0], first=places[1], piece=places[2], slot=places[3],
             space=self._numbers.ctypes.data + 8 * spans, end=self._end.ctypes.data,
         )  # fmt: skip
@@ -72,8 +72,8 @@ class SolverTask:
 class Solver:
     """Runs of one group; tasks of the shapes last used are kept, so that a repeated call allocates nothing."""
 
-    def __init__(self, library: MagnusLibrary, gram: Array) -> None:
-        self._library, self._gram = library, gram
+    def __init__(self, library: MagnusLibrary, norms: Array) -> None:
+        self._library, self._norms = library, norms
         self._idle: dict[tuple[int, int, int, int], list[SolverTask]] = {}
 
     def __call__(
@@ -95,7 +95,7 @@ class Solver:
         try:
             return self._idle[shape].pop()
         except (KeyError, IndexError):
-            return SolverTask(self._library, self._gram, *shape)
+            return SolverTask(self._library, self._norms, *shape)
 
     def give_back(self, shape: tuple[int, int, int, int], task: SolverTask) -> None:
         """For the next call of that shape, unless it holds much memory."""
@@ -137,9 +137,3 @@ class WaveRuns:
             rates=F, rate=place, rate_low=fixed + 8, cosines=place + 8 * F, sines=place + 8 * F * (n + 1), factor=fixed
         )
         return task, row
-
-
-def gram_of(group: MatrixGroup) -> Array:
-    """x' G x = |hat(x)|^2, Frobenius."""
-    flat = np.asarray(group.basis).reshape(group.dim, -1)
-    return np.ascontiguousarray((flat @ np.conj(flat.T)).real)

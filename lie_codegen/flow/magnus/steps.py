@@ -64,7 +64,7 @@ class Steps:
         return self.knots[span] + (np.arange(self.count) - self.first[span]) * h, h
 
 
-def plan_steps(drive: Drive, gram: Array, times: Array, most: int) -> Steps | None:
+def plan_steps(drive: Drive, norms: Array, times: Array, most: int) -> Steps | None:
     """The coarsest steps that end at all the times (the first is the start) and at the ends of the pieces of u; None beyond `most`.
 
     Every span has steps of its own density, so that a short pulse does not make the rest slow.
@@ -72,7 +72,7 @@ def plan_steps(drive: Drive, gram: Array, times: Array, most: int) -> Steps | No
     inside = drive.times[(drive.times > times[0]) & (drive.times < times[-1])]
     knots = np.union1d(times, inside)
     piece = drive.piece_of((knots[:-1] + knots[1:]) / 2)
-    wanted = np.ceil(np.diff(knots) * drive.density(gram, piece) * (1 - 1e-12))
+    wanted = np.ceil(np.diff(knots) * drive.density(norms, piece) * (1 - 1e-12))
     if not np.all(np.isfinite(wanted)) or np.sum(wanted) > most:
         return None
     parts = np.maximum(wanted, 1).astype(np.intp)
