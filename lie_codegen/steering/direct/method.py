@@ -30,6 +30,7 @@ from lie_codegen.steering.direct.reach import require_reach
 from lie_codegen.steering.direct.report import cost_of, plan_of
 from lie_codegen.steering.direct.robust import robust
 from lie_codegen.steering.direct.search import LARGE, Budget, Found, search
+from lie_codegen.steering.direct.switches import switched
 from lie_codegen.steering.direct.system import System, controls_of, velocity
 from lie_codegen.steering.goals import end_of
 from lie_codegen.steering.plan import Plan, Status
@@ -125,6 +126,9 @@ def direct(
     programme = constant_pieces(task, count)
     found = search(task, programme, solver, budget, guessed(task, guess, count), say)
     if not found.arrived:
+        edge = switched(task, found.near)
+        if edge is not None:
+            return _at_the_edge(task, target, found, *edge, budget, tolerance, objective, began)
         raise _not_found(task, target, found, budget, tolerance, began)
     u, best = corrected(task, solver, programme, found.u, found.variant, False, settings)
     blocks = as_inputs(task, u, False)
@@ -210,6 +214,42 @@ def _smoother(
     if now.miss <= max(10 * before.miss, 1e-9):
         return now, f"continuous controls, linear on {pieces} pieces"
     return before, plain
+
+
+def _at_the_edge(
+    task: Manoeuvre,
+    target: Any,
+    found: Found,
+    best: Flown,
+    variant: int,
+    budget: Budget,
+    tolerance: float,
+    objective: str,
+    began: float,
+) -> Plan:
+    """The plan of arcs whose ends moved: nothing cheaper was sought, at the edge of what can be reached there is next to no choice."""
+    arcs = len(best.inputs.first)
+    details = {
+        "winner": "direct, arcs with free ends",
+        "objective": objective,
+        "tried": (
+            *found.tried,
+            f"{arcs} arcs with free ends reach it from one of the nearest {len(found.near)} starts",
+        ),
+        "starts": found.starts,
+        "reached": 0,
+        "agree": 1,
+        "seed": budget.seed,
+        "pieces": best.inputs,
+        "pieces_cost": cost_of(task, best.inputs, objective),
+        "pieces_peaks": best.inputs.peaks(),
+        "discretisation": f"none: {arcs} arcs of constant controls",
+        "optimality": "not sought: equal pieces did not reach the goal, which lies at the edge of what the bounds allow",
+    }
+    if task.end.phases:
+        details["phase"] = task.end.phases[variant]
+    took = {"solve": time.perf_counter() - began}
+    return plan_of(task, target, best, variant, tolerance, objective, details, took, Status.SOLVED)
 
 
 def _not_found(

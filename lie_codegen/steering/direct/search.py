@@ -17,6 +17,8 @@ _PLENTY = 4
 #: Least starts for each of a goal's variants (the phases of a gate).
 _EACH = 4
 _AGREEING = 0.01
+#: Lanes that are kept where none arrived.
+_NEAR = 8
 #: Dimension above which a few starts alone descend, and how many.
 LARGE, _SIDE_BY_SIDE = 20, 8
 #: Dimension up to which all starts descend to the end; steps that they take together above it.
@@ -54,6 +56,7 @@ class Found:
         cost: its objective.
         starts, reached, agree: starts tried, starts that arrived, starts that descended to within 1 % of the cheapest.
         tried: one line a round.
+        near: controls (S, m) and variants of the lanes that came nearest where none arrived.
     """
 
     u: Array = field(repr=False)
@@ -65,6 +68,7 @@ class Found:
     reached: int
     agree: int
     tried: tuple[str, ...]
+    near: tuple[tuple[Array, int], ...] = field(default=(), repr=False)
 
 
 def search(
@@ -106,8 +110,9 @@ def search(
     arrived = np.flatnonzero(size <= enough)
     reached = len(arrived)
     if not reached:
-        nearest = int(np.nanargmin(size))
-        return Found(u[nearest], int(variant[nearest]), float(size[nearest]), False, np.inf, total, 0, 0, tuple(tried))
+        order = np.argsort(size, kind="stable")[:_NEAR]
+        near = tuple((u[lane], int(variant[lane])) for lane in order)
+        return Found(*near[0], float(size[order[0]]), False, np.inf, total, 0, 0, tuple(tried), near)
     if task.system.group.dim > LARGE:
         # a descent takes seconds there: from the cheapest alone, as many as run side by side
         effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2))

@@ -1,0 +1,50 @@
+"""Targets at the edge of what bounded controls can reach: bang-bang controls made them, and next to no others reach them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import lie_codegen as lc
+
+
+@pytest.mark.parametrize(
+    ("name", "controls", "drift"),
+    [("se2", ("omega",), (0, 1, 0)), ("su2", ("sx",), (0, 0, 1)), ("h3", ("x", "y"), None)],
+)
+def test_targets_of_bang_bang_controls_are_reached(name: str, controls: tuple[str, ...], drift: Any) -> None:
+    group, rng = lc.group(name), np.random.default_rng(7)
+    free = np.zeros(3) if drift is None else np.array(drift, dtype=float)
+    columns = np.eye(3)[[group.labels.index(label) for label in controls]]
+    options = {} if drift is None else {"drift": drift}
+    winners = []
+    for _ in range(3):
+        signs = np.sign(rng.normal(size=(3, len(controls))))
+        lengths = 5.0 * rng.dirichlet(np.ones(3))
+        X = np.eye(group.degree, dtype=group.basis.dtype)
+        for u, length in zip(signs, lengths, strict=True):
+            X = X @ expm(group.hat(length * (free + u @ columns)))
+        plan = lc.steer(group, X, controls, 5.0, bounds=1, **options)
+        winners.append(plan.details["winner"])
+        knots = np.concatenate([[0.0], plan.u.breakpoints, [5.0]])
+        end = np.eye(group.degree, dtype=group.basis.dtype)
+        steady = plan.details["pieces"]
+        if winners[-1] == "direct, arcs with free ends":
+            for a, b in pairwise(knots):
+                end = end @ expm(group.hat((b - a) * (free + steady((a + b) / 2) @ columns)))
+            np.testing.assert_allclose(end, X, atol=1e-8)
+        assert plan.error < 1e-6
+        assert np.max(np.abs(plan.inputs(np.linspace(0, 5, 501)))) <= 1 + 1e-9
+    assert "direct, arcs with free ends" in winners
+
+
+def test_beyond_the_edge_nothing_is_found() -> None:
+    """A car that cannot stop is back one metre ahead after one second, or after a whole turn: not after three."""
+    X = np.eye(3)
+    X[0, 2] = 1.0
+    with pytest.raises(lc.errors.SteeringError, match="proves nothing"):
+        lc.steer("se2", X, ("omega",), 3.0, drift=(0, 1, 0), bounds=1, rounds=1)
