@@ -801,7 +801,41 @@ static void take_new(workspace *w)
     memcpy(w->u, w->u_new, sizeof w->u);
 }
 
+#if OCP_FREE
+/* The last state of all is T, how long the plan lasts, in units of which the equations count time. */
+static real within_durations(real T)
+{
+    return T > shortest_duration ? (T < longest_duration ? T : longest_duration) : shortest_duration;
+}
+
+/* Where the quadratic model P, v of the cost-to-go is least in T, for a first state that is d away from the plan's. */
+static real better_duration(const workspace *w, const real *P, const real *v, const real *d)
+{
+    const real slope = v[NX - 1] + dot(P + (NX - 1) * NX, d, NX - 1), curvature = P[NX * NX - 1], T = w->x[0][NS - 1];
+    return curvature > 0 ? within_durations(T - slope / curvature) - T : 0;
+}
+#endif
+
+/* The measured state as the first of the roll-out; the part `alpha` of the change of a free duration with it. */
+static void place_first(workspace *w, const real *measured, real alpha, real change)
+{
+    copy(w->x_new[0], measured, NS);
+#if OCP_FREE
+    w->x_new[0][NS - 1] = w->x[0][NS - 1] + alpha * change;
+#endif
+    (void)alpha, (void)change;
+}
+
 #if OCP_PLANS
+#if OCP_FREE
+/* The same where a plan is sought, far from which the cost may bend downwards: then a large step the way that it falls. */
+static real sought_duration(const workspace *w, const real *P, const real *v)
+{
+    const real none[NX] = { 0 }, T = w->x[0][NS - 1];
+    return P[NX * NX - 1] > 0 ? better_duration(w, P, v, none) : within_durations(T * (v[NX - 1] > 0 ? (real)0.7 : (real)1.4)) - T;
+}
+#endif
+
 static int roll_out(const task *s)
 {
     workspace *w = s->w;
@@ -820,7 +854,7 @@ static int roll_out(const task *s)
 static int iterate(task *s, real *M, real *shift, real least)
 {
     workspace *w = s->w;
-    real gain = 0, value, alpha, P[NX * NX], v[NX];
+    real gain = 0, value, alpha, change = 0, P[NX * NX], v[NX];
     int tries;
     for (tries = 0; !backward(s, *shift, &gain, &value, P, v); ++tries) {
         if (tries == 20) {
@@ -834,12 +868,19 @@ static int iterate(task *s, real *M, real *shift, real least)
         *shift = largest(10 * *shift, (real)1e-6);
     }
     ++w->sweeps;
+#if OCP_FREE
+    if (w->choose) {
+        change = sought_duration(w, P, v);
+        gain -= change * (v[NX - 1] + change * P[NX * NX - 1] / 2);
+    }
+#endif
     if (gain <= least) {
         return 2;
     }
-    copy(w->x_new[0], w->x[0], NS);
     for (alpha = 1; alpha > (real)4e-4; alpha /= 2) {
-        const real trial = forward(s, alpha);
+        real trial;
+        place_first(w, w->x[0], alpha, change);
+        trial = forward(s, alpha);
         if (*M - trial >= (real)1e-4 * alpha * gain) {
             take_new(w);
             *M = trial;
@@ -1017,12 +1058,6 @@ real OCP_(plan_cost)(workspace *w, const real *p, ptrdiff_t stride, real t0)
 #endif
 
 #if OCP_FREE
-/* The last state of all is T, how long the plan lasts, in units of which the equations count time. */
-static real within_durations(real T)
-{
-    return T > shortest_duration ? (T < longest_duration ? T : longest_duration) : shortest_duration;
-}
-
 /* Takes a sample off the plan's duration; each stage takes what held in its middle: from further on, so that nothing is lost. */
 static void shift_in_time(workspace *w)
 {
@@ -1062,13 +1097,6 @@ static void shift_plan(const task *s)
     }
 }
 
-/* Where the quadratic model P, v of the cost-to-go is least in T, for a first state that is d away from the plan's. */
-static real better_duration(const workspace *w, const real *P, const real *v, const real *d)
-{
-    const real slope = v[NX - 1] + dot(P + (NX - 1) * NX, d, NX - 1), curvature = P[NX * NX - 1], T = w->x[0][NS - 1];
-    return curvature > 0 ? within_durations(T - slope / curvature) - T : 0;
-}
-
 /* The mean of the plan's control over a sample. */
 static void held_control(const workspace *w, real *u)
 {
@@ -1106,16 +1134,6 @@ static void shift_plan(const task *s)
 
 static void held_control(const workspace *w, real *u) { copy(u, w->u[0], OCP_M); }
 #endif
-
-/* The measured state as the first of the roll-out; the part `alpha` of the change of a free duration with it. */
-static void place_first(workspace *w, const real *measured, real alpha, real change)
-{
-    copy(w->x_new[0], measured, NS);
-#if OCP_FREE
-    w->x_new[0][NS - 1] = w->x[0][NS - 1] + alpha * change;
-#endif
-    (void)alpha, (void)change;
-}
 
 /* The sample's own step: see the header. */
 int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdiff_t stride, real t0, int iterations, real *u)

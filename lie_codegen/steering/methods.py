@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any
 
 from lie_codegen.errors import SteeringInputError
@@ -15,6 +16,7 @@ from lie_codegen.steering.closed_form.swing_twist import swing_twist
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import Task
+from lie_codegen.steering.transcription.numbers import Options
 
 Method = Callable[..., Plan]
 
@@ -30,7 +32,7 @@ class _Transcription:
 
     @property
     def __kwdefaults__(self) -> dict[str, Any]:
-        return dict(self.method.__kwdefaults__ or {})
+        return {**{each.name: each.default for each in fields(Options)}, "progress": None}
 
     def __call__(self, task: Task, **options: Any) -> Plan:
         return self.method(task, **options)

@@ -110,12 +110,11 @@ def test_a_free_duration_is_chosen_anew_at_every_sample() -> None:
     controller = lc.mpc(problem, sample=0.1)
     controller.reset(near)
     X, se2 = np.eye(3), lc.group("se2")
-    for k in range(8):
+    for _ in range(8):
         u = controller.step(X, goal=goal)
         near = problem.solve(X, goal=goal, guess=near)
         assert controller.status == "ok"
         assert controller.duration == pytest.approx(near.duration, abs=2e-3)
-        assert controller.duration < near.duration + 0.1 * k
         times = np.linspace(0, 0.1, 201)[:-1] + 0.00025  # what is handed out is the plan's mean over a sample
         np.testing.assert_allclose(u, np.mean(controller.plan.u(times), axis=0), atol=5e-3)
         X = X @ expm(se2.hat([0.1 * u[0], 0.1 * u[1], 0])) @ expm(se2.hat(0.01 * rng.normal(size=3)))

@@ -480,6 +480,21 @@ def test_a_free_duration_is_found_and_its_derivatives_are_right() -> None:
         lc.ocp(SO3, **{**BASE, "duration": (2, 1)})
 
 
+def test_a_least_time_is_that_of_the_closed_form() -> None:
+    """A double integrator about one axis: T = 2 sqrt(J phi / b), the torque at its bound, then at the other."""
+    phi, J, b = 0.8, 2.0, 0.5
+    problem = lc.ocp(
+        SO3, dynamics="second_order", inertia=(1.0, J, 3.0), controls=("w2",), duration=(0.5, 20.0), intervals=32, bounds=b,
+        stage_cost="1 + 1e-6*norm2(u)", target="Xd", terminal=("xi",), name="least_time",
+    )  # fmt: skip
+    plan = problem.solve(Xd=rotation((0, phi, 0)))
+    assert plan.status is Status.SOLVED
+    assert plan.duration == pytest.approx(2 * np.sqrt(J * phi / b), rel=1e-6)
+    np.testing.assert_allclose(plan.u[[0, 15, 16, 31], 0], [b, b, -b, -b], atol=1e-3)
+    several = problem.solve(Xd=rotation((0, phi, 0)), starts=4)
+    assert several.duration == pytest.approx(plan.duration, rel=1e-6)
+
+
 def test_forces_and_allocation_of_the_second_order_are_those_of_the_equations() -> None:
     """A satellite on four skew thrusters in a gravity gradient, by DOP853."""
     inertia = np.array([3.0, 2.0, 1.5])

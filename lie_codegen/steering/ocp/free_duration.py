@@ -1,7 +1,7 @@
-"""The best duration: Newton's method on the optimal cost as a function of it, within a bracket.
+"""The best duration by Newton's method on the optimal cost as a function of it, within a bracket: where choosing it with the controls fails.
 
 The duration is a state T that does not move, so that the sweep which gives the gains gives dV/dT and d2V/dT2 too (the conditions'
-multipliers among them): each step costs one warm solution.
+multipliers among them): each step costs one warm solution. The solver chooses it with the controls, much sooner, by the same two numbers.
 """
 
 from __future__ import annotations

@@ -214,13 +214,18 @@ class InterpretedMachine(Machine):
             shift = max(10 * shift, 1e-6)
         if swept is None:
             return 0, M, shift
-        if swept[0] <= least:
+        gain, change, durations = swept[0], np.zeros(len(run.space["x"][0])), self.data.free_duration
+        if durations is not None and run.space["choose"]:
+            P, v = swept[2], swept[3]
+            change[-1] = _sought_duration(float(run.space["x"][0, -1]), P, v, durations)
+            gain -= float(change[-1] * (v[-1] + change[-1] * P[-1, -1] / 2))
+        if gain <= least:
             return 2, M, shift
-        run.space["x_new"][0] = run.space["x"][0]
         for halvings in range(12):
             alpha = 0.5**halvings
+            run.space["x_new"][0] = run.space["x"][0] + alpha * change
             trial = self._forward(run, alpha)
-            if M - trial >= 1e-4 * alpha * swept[0]:
+            if M - trial >= 1e-4 * alpha * gain:
                 self._take_new(run)
                 return 1, trial, 0.0 if 0.3 * shift < 1e-5 else 0.3 * shift
         return 0, M, shift
@@ -444,3 +449,10 @@ def _better_duration(T: float, P: Array, v: Array, d: Array, durations: tuple[fl
     """The change of T at which the quadratic model is least, for a first state that is d away from the plan's."""
     slope, curvature = v[-1] + P[-1, :-1] @ d[:-1], P[-1, -1]
     return float(min(max(T - slope / curvature, durations[0]), durations[1]) - T) if curvature > 0 else 0.0
+
+
+def _sought_duration(T: float, P: Array, v: Array, durations: tuple[float, float]) -> float:
+    """The same where a plan is sought, far from which the cost may bend downwards: then a large step the way that it falls."""
+    if P[-1, -1] > 0:
+        return _better_duration(T, P, v, np.zeros(len(v)), durations)
+    return float(min(max(T * (0.7 if v[-1] > 0 else 1.4), durations[0]), durations[1]) - T)

@@ -89,5 +89,5 @@ def workspace_type(intervals: int, sizes: Sizes) -> np.dtype[Any]:
         ("shift", float),
         ("sample", float),
     ]
-    counts = ("worst", "worst_stage", "iterations", "sweeps", "curvature", "fresh", "status", "stop")
+    counts = ("worst", "worst_stage", "iterations", "sweeps", "curvature", "fresh", "status", "choose", "stop")
     return np.dtype([*numbers, *[(name, np.intc) for name in counts]], align=True)

@@ -104,6 +104,10 @@ class OptimalControlProblem:
         first = guess.duration if isinstance(guess, OptimalPlan) else float(np.sqrt(free[0] * free[1]))
         x0, rows = self.start(X0, {**values, "T": first}, where)
 
+        found = self._best(x0, rows, guess, replace(options, choose=True), where)
+        if found.status is Status.SOLVED:
+            return found
+
         def at(T: float, near: Any) -> OptimalPlan:
             x0[-1] = T
             return self._best(x0, rows, near, options if near is guess else replace(options, starts=1), where)

@@ -26,7 +26,7 @@ _MORE = 8
 
 @dataclass(frozen=True)
 class Options:
-    """Those of `solve`."""
+    """Those of `solve`; and whether a free duration is chosen with the controls."""
 
     starts: int
     seed: int
@@ -35,6 +35,7 @@ class Options:
     allowed: float
     iterations: int
     curvature: bool
+    choose: bool = False
 
 
 class Search:
@@ -142,6 +143,7 @@ class Search:
         curvature = self.options.curvature
         space = self.machine.workspace()
         space["x"][0, 0] = self.x0
+        space["choose"] = int(self.options.choose)
         space["rho"], space["curvature"] = _PENALTY, int(curvature)
         if first is None:
             self.machine.first_guess(space, self.rows, 0.0)
@@ -154,6 +156,11 @@ class Search:
         if number:
             noise = np.random.default_rng((self.options.seed, number)).normal(size=space["u"][0].shape)
             space["u"][0] += _SPREAD * noise
+            durations = self.data.free_duration
+            if self.options.choose and durations is not None:
+                # one start in the middle is not enough: with a drift the durations that reach a goal have gaps
+                share = np.random.default_rng((self.options.seed, number, 1)).uniform()
+                space["x"][0, 0, -1] = durations[0] * (durations[1] / durations[0]) ** share
         return space
 
 

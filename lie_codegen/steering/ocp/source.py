@@ -151,7 +151,7 @@ def workspace_bytes(data: ProblemData, model: Model, real: str) -> int:
     numbers = 2 * ((N + 1) * stored + N * m) + N * m * nx + N * m + N * max(1, s.path)
     numbers += max(1, s.end_path + s.end) + nx * nx + nx + 5
     size = 8 if real == "double" else 4
-    return -(-(numbers * size + 8 * 4) // size) * size
+    return -(-(numbers * size + 9 * 4) // size) * size
 
 
 def render_solver(view: SolverView) -> dict[str, str]:

@@ -15,7 +15,32 @@ from lie_codegen.steering.constraints import Obstacle
 
 @dataclass(frozen=True)
 class Options:
-    """What a user asks for; the attributes are the options of `transcription`, which documents them."""
+    """What a user asks for.
+
+    Attributes:
+        bounds: of the controls: a number (both signs), a (low, high) pair, or {label: either}; units of u.
+        rate_bounds: of the controls' time derivatives, as bounds.
+        obstacles: `Cone`s (attitude exclusion) and `Ball`s (position), for all of the way.
+        via: (fraction of the duration, element or coordinates of the second kind) to pass through.
+        drift: (n,) constant velocity added to the controls' own: X' = X hat(drift + u).
+        rest: controls are zero at both ends.
+        periodic: controls end as they begin: a gait, whose repetition moves by the target each time.
+        objective: "energy", int sum w_i u_i^2, or "time".
+        longest: for "time": the longest duration allowed, in units of the task's.
+        dynamics: "first_order": u is a velocity; "second_order": u is a torque, or force, on the controlled components,
+            X' = X hat(xi), J xi' = ad*_xi J xi + u, from rest to rest.
+        inertia: J: a number, (n,) or (n, n), symmetric positive definite; for second order, as what follows.
+        velocity_bounds: of any component of xi, as bounds.
+        start_velocity, end_velocity: (n,) xi at the ends, zero if not given.
+        weights: (m,) positive w_i, ones if not given.
+        intervals: N, pieces of the controls.
+        starts: first guesses tried; the cheapest admissible result wins.
+        solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere; ipopt alone where the controls are periodic,
+            or do not reach all without the drift or the inertia. Or "fatrop" or "ipopt".
+        classes: shortest classes of ways between discs in the plane (`Ball`s on SE(2)) tried beside the other guesses, each with three
+            end headings; 0 for none. All that were found are in details["classes"]: word, cost, clearance.
+        guess: controls to start from beside the others: a Plan, or samples (k, m) at equal times.
+    """
 
     bounds: Any = None
     rate_bounds: Any = None

@@ -35,7 +35,6 @@ _IPOPT = {
     "max_iter": 500,
     "tol": 1e-10,
     "mu_init": 1e-3,
-    "max_wall_time": 30.0,
     "bound_relax_factor": 0.0,
 }
 _COMMON = {

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.logarithm import distance
-from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Facts, Plan, Status
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.complaint import complaint, ends_in_obstacles
@@ -47,66 +46,20 @@ _ELSEWHERE = 2
 _IDLE = 1e-5
 
 
-def transcription(
-    task: Task,
-    *,
-    bounds: Any = None,
-    rate_bounds: Any = None,
-    obstacles: Sequence[Obstacle] = (),
-    via: Sequence[tuple[float, ArrayLike]] = (),
-    drift: ArrayLike | None = None,
-    rest: bool = False,
-    periodic: bool = False,
-    objective: str = "energy",
-    longest: float = 20.0,
-    dynamics: str = "first_order",
-    inertia: Any = None,
-    velocity_bounds: Any = None,
-    start_velocity: ArrayLike | None = None,
-    end_velocity: ArrayLike | None = None,
-    weights: ArrayLike | None = None,
-    intervals: int = 64,
-    starts: int = 3,
-    solver: str = "auto",
-    classes: int = 4,
-    guess: Any = None,
-    progress: Callable[[str], None] | None = None,
-) -> Plan:
+def transcription(task: Task, *, progress: Callable[[str], None] | None = None, **asked: Any) -> Plan:
     """Minimum energy, or minimum time, under constraints; controls are continuous and linear on each interval.
 
     Args:
         task: the task; for minimum time its duration is the first guess, and the unit of `longest`.
-        bounds: of the controls: a number (both signs), a (low, high) pair, or {label: either}; units of u.
-        rate_bounds: of the controls' time derivatives, as bounds.
-        obstacles: `Cone`s (attitude exclusion) and `Ball`s (position), for all of the way.
-        via: (fraction of the duration, element or coordinates of the second kind) to pass through.
-        drift: (n,) constant velocity added to the controls' own: X' = X hat(drift + u).
-        rest: controls are zero at both ends.
-        periodic: controls end as they begin: a gait, whose repetition moves by the target each time.
-        objective: "energy", int sum w_i u_i^2, or "time".
-        longest: for "time": the longest duration allowed, in units of the task's.
-        dynamics: "first_order": u is a velocity; "second_order": u is a torque, or force, on the controlled components,
-            X' = X hat(xi), J xi' = ad*_xi J xi + u, from rest to rest.
-        inertia: J: a number, (n,) or (n, n), symmetric positive definite; for second order, as what follows.
-        velocity_bounds: of any component of xi, as bounds.
-        start_velocity, end_velocity: (n,) xi at the ends, zero if not given.
-        weights: (m,) positive w_i, ones if not given.
-        intervals: N, pieces of the controls.
-        starts: first guesses tried; the cheapest admissible result wins.
-        solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere; ipopt alone where the controls are periodic,
-            or do not reach all without the drift or the inertia. Or "fatrop" or "ipopt".
-        classes: shortest classes of ways between discs in the plane (`Ball`s on SE(2)) tried beside the other guesses, each with three
-            end headings; 0 for none. All that were found are in details["classes"]: word, cost, clearance.
-        guess: controls to start from beside the others: a Plan, or samples (k, m) at equal times.
         progress: called with one line a solve, and within a long one by ipopt every second. What was done is in the plan's
             details["solves"] in any case: start, solver, iterations, objective, violation, seconds and ipopt's residuals.
+        **asked: the attributes of `Options`.
 
     Raises:
         SteeringInputError, ShapeError: about an option.
         SteeringError: no admissible manoeuvre found; says which limit the first guess breaks, and by how much.
     """
-    given = {name: value for name, value in locals().items() if name not in ("task", "progress")}
-    return _run(task, Options(**given), "transcription", (), progress)
+    return _run(task, Options(**asked), "transcription", (), progress)
 
 
 def least_energy(
