@@ -6,7 +6,7 @@ import ctypes
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.benchmarks import peers as peers
-from lie_codegen.benchmarks.limits import reading
+from lie_codegen.benchmarks.limits import arithmetic_work, memory_work
 from lie_codegen.benchmarks.rows import AbsentError, Entrant, Row, Work, compete
 from lie_codegen.benchmarks.symforce_peer import SymForce
 from lie_codegen.kernel.casadi_arithmetic import flatten, function_of
@@ -29,24 +29,28 @@ _SWAP = [3, 4, 5, 0, 1, 2]
 
 
 def kernel_rows(kernel: Kernel, folder: Path, rounds: int, hand: ctypes.CDLL) -> list[Row]:
-    """One row of calls, one of batches of 4,096, one of a million."""
+    """One row of calls, one of batches of 4,096, one of a million; those say how near their limit they are."""
     contest = _Contest(kernel, folder)
     rows = [compete("call", kernel.symbol, "ns a call", 1, rounds, list(contest.calls()))]
-    doubles = sum(port.size for port in kernel.inputs + kernel.outputs)
+    read, written = (sum(port.size for port in ports) for ports in (kernel.inputs, kernel.outputs))
     for count in (SMALL, LARGE):
         some = rounds if count == SMALL else max(3, rounds // 4)
         entrants = [*contest.batches(count), *(contest.maps(count) if count == SMALL else ())]
         if count == LARGE:
-            entrants.append(Entrant(_READ, lambda: reading(hand, doubles * LARGE), compared=False))
+            entrants.append(Entrant(_MOVED, lambda: memory_work(hand, read * LARGE, written * LARGE), compared=False))
+        operations = peers.instructions(kernel) * count
+        entrants.append(Entrant(_COMPUTED, partial(arithmetic_work, hand, operations), compared=False))
         row = compete("batch", f"{kernel.symbol}, {count}", "ns a sample", count, some, entrants, SMALL)
-        if count == LARGE:
-            row = replace(row, note=f"{row.timings[_READ].ratio.middle:.0%} of the read bandwidth")
-        rows.append(row)
+        limits = {name: row.timings[name].ratio.middle for name in (_MOVED, _COMPUTED) if name in row.timings}
+        nearest = max(limits, key=lambda name: limits[name])
+        rows.append(replace(row, note=f"{limits[nearest]:.0%} of the roof, {nearest.removeprefix('limit: ')}"))
     return rows
 
 
 _OURS = "lie_codegen, out="
-_READ = "limit: as many bytes read"
+#: What bounds a batch of many samples, and one that stays in the caches; the time of one multiply-add is that of any operation.
+_MOVED = "limit: as many bytes moved"
+_COMPUTED = "limit: as many operations"
 
 
 class _Contest:

@@ -15,9 +15,10 @@ from lie_codegen.benchmarks.rows import Work
 
 @dataclass(frozen=True)
 class Limits:
-    """Of one core: bytes read per second, multiply-adds per second (2 operations each)."""
+    """Of one core: bytes read per second, bytes written past the caches, multiply-adds per second (2 operations each)."""
 
     read: float
+    written: float
     operations: float
 
 
@@ -35,22 +36,37 @@ def machine() -> str:
 
 def limits(hand: ctypes.CDLL) -> Limits:
     """The best of several runs."""
-    data, count = np.ones(32 * 2**20 // 4), 200_000
-    reads, rates = [], []
+    doubles, count = 32 * 2**20 // 4, 200_000
+    works = (memory_work(hand, doubles, 0), memory_work(hand, 0, doubles), arithmetic_work(hand, _AT_ONCE * count))
+    units = (8 * doubles, 8 * doubles, 2 * _AT_ONCE * count)
+    rates: list[list[float]] = [[], [], []]
     for _ in range(9):
-        started = time.process_time()
-        hand.read_all(ctypes.c_ssize_t(data.size), ctypes.c_void_p(data.ctypes.data))
-        middle = time.process_time()
-        hand.multiply_add(ctypes.c_ssize_t(count), ctypes.c_double(0.5))
-        reads.append(data.nbytes / (middle - started))
-        rates.append(2 * 12 * 8 * count / (time.process_time() - middle))
-    return Limits(max(reads), max(rates))
+        for work, amount, seen in zip(works, units, rates, strict=True):
+            started = time.process_time()
+            work()
+            seen.append(amount / (time.process_time() - started))
+    return Limits(*(max(seen) for seen in rates))
 
 
-def reading(hand: ctypes.CDLL, doubles: int) -> Work:
-    """The work of reading so many doubles once."""
-    data = np.ones(doubles)
-    return lambda: hand.read_all(ctypes.c_ssize_t(data.size), ctypes.c_void_p(data.ctypes.data))
+#: Multiply-adds in one round of the loop in bench_hand.c.
+_AT_ONCE = 12 * 8
+
+
+def memory_work(hand: ctypes.CDLL, read: int, written: int) -> Work:
+    """The work of reading so many doubles and writing so many, once."""
+    data, room = np.ones(read), np.ones(written + 8)
+    room = room[-room.ctypes.data % 64 // 8 :]  # from a multiple of 64 bytes
+
+    def work() -> None:
+        hand.read_all(ctypes.c_ssize_t(read), ctypes.c_void_p(data.ctypes.data))
+        hand.write_all(ctypes.c_ssize_t(written), ctypes.c_void_p(room.ctypes.data))
+
+    return work
+
+
+def arithmetic_work(hand: ctypes.CDLL, operations: int) -> Work:
+    """So many multiply-adds of numbers that are at hand."""
+    return lambda: hand.multiply_add(ctypes.c_ssize_t(operations // _AT_ONCE), ctypes.c_double(0.5))
 
 
 def keep_to_one_core() -> None:

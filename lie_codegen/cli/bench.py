@@ -73,7 +73,8 @@ def _propagate(json: bool) -> None:
 def _text(result: Bench) -> str:
     lines = [
         result.machine,
-        f"one core reads {result.limits.read / 1e9:.1f} GB/s and does {result.limits.operations / 1e9:.1f} GFLOP/s",
+        f"one core reads {result.limits.read / 1e9:.1f} GB/s, writes {result.limits.written / 1e9:.1f} GB/s and does "
+        f"{result.limits.operations / 1e9:.1f} GFLOP/s",
         "median, and ratio to lie_codegen within a round: min / median / max",
     ]
     for row in result.rows:
