@@ -25,6 +25,7 @@ def write_package(tree: Mapping[str, str], folder: str | Path) -> Path:
     Raises:
         OutputFolderError: the folder cannot be written, or holds a file that this package did not write
             or that was edited since; nothing is touched then.
+        SystemRefusalError: the disk is full; nothing is touched.
     """
     if not isinstance(folder, str | os.PathLike):
         raise OutputFolderError(f"the folder to write must be a path, got {folder!r}")

@@ -32,7 +32,6 @@ class Invariance(Saved):
     symmetric: bool
 
 
-@lru_cache(maxsize=64)
 def invariance(error: ErrorFunction) -> Invariance:
     """The invariances of an error function.
 
@@ -41,6 +40,11 @@ def invariance(error: ErrorFunction) -> Invariance:
     """
     if not isinstance(error, ErrorFunction):
         raise InputError(f"invariance: takes an error function, as lc.error_function makes it; given {shown(error)}")
+    return _invariance(error)
+
+
+@lru_cache(maxsize=64)
+def _invariance(error: ErrorFunction) -> Invariance:
     samples, rng = error_samples(error), np.random.default_rng(0)
     X, Y, G = (random_elements(error.group, _PLACES, rng, 1.0) for _ in range(3))
 

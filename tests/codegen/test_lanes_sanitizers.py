@@ -112,7 +112,9 @@ def batches(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="needs gcc and its sanitizers")
-@pytest.mark.parametrize("machine", ["native", *(["haswell", "x86-64"] if X86 else [])])
+@pytest.mark.parametrize(
+    "machine", ["native", *([pytest.param("haswell", marks=pytest.mark.slow), "x86-64"] if X86 else [])]
+)
 def test_batches_of_every_length_are_clean(batches: Path, machine: str) -> None:
     if machine == "haswell" and "avx2" not in Path("/proc/cpuinfo").read_text():
         pytest.skip("no AVX2 here")

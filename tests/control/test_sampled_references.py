@@ -22,7 +22,7 @@ def curve(name: str, t: np.ndarray) -> np.ndarray:
     return found
 
 
-@pytest.mark.parametrize("name", ["so3", "se2", "h3", "se3"])
+@pytest.mark.parametrize("name", ["so3", "se2", "h3", pytest.param("se3", marks=pytest.mark.slow)])
 def test_samples_of_a_smooth_curve(name: str) -> None:
     group, fine = lc.group(name), np.linspace(0, 4, 201)
     errors = []

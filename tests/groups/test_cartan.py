@@ -14,8 +14,14 @@ from lie_codegen.groups.wei_norman.chart_domain import chart_domain
 COMPACT = {"sl2": 1, "sl3": 3, "sl4": 6, "sp4": 4, "so31": 3, "so3": 3, "so4": 6, "su2": 3, "su3": 8}
 
 
-@pytest.mark.parametrize("name", COMPACT)
-@pytest.mark.parametrize("basis", ["own", "generic"])
+@pytest.mark.parametrize(
+    ("name", "basis"),
+    [
+        pytest.param(name, basis, marks=[pytest.mark.slow] if (name, basis) == ("su3", "generic") else [])
+        for name in COMPACT
+        for basis in ("own", "generic")
+    ],
+)
 def test_involutions_are_automorphisms_with_a_positive_form_and_the_known_compact_part(name: str, basis: str) -> None:
     group = lc.group(name)
     if basis == "generic":
@@ -53,7 +59,7 @@ def test_verdicts_on_charts_do_not_depend_on_the_representation(plain: str, othe
         assert mine.changed_domain.end == theirs.changed_domain.end
 
 
-@pytest.mark.parametrize("name", ["se3", "so4", "su3", "sp4", "sim3"])
+@pytest.mark.parametrize("name", ["se3", "so4", pytest.param("su3", marks=pytest.mark.slow), "sp4", "sim3"])
 def test_generic_bases_get_a_short_verdict_that_says_what_is_numeric(name: str) -> None:
     group = generic_basis(lc.group(name), np.random.default_rng(1))
     found = lc.wei_norman_order(group)

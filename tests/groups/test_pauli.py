@@ -51,6 +51,7 @@ def test_matrices_that_are_not_closed_or_not_independent_are_still_named() -> No
         lc.from_matrices("twice", ("a", "b"), [X, X])
 
 
+@pytest.mark.slow
 def test_a_toffoli_gate_from_a_chain_of_three_qubits() -> None:
     toffoli = np.eye(8)[[0, 1, 2, 3, 4, 5, 7, 6]]
     local = ("XII", "YII", "IXI", "IYI", "IIX", "IIY")

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,8 @@ def test_every_public_name_is_the_same_object_by_both_doors(subject: str) -> Non
         value = getattr(package, name)
         assert value is getattr(lc, name)
         assert getattr(value, "__doc__", None), f"{name} has no docstring"
+        if hasattr(value, "cache_info"):
+            assert not signature(value).parameters, f"{name}: a memo hashes its arguments before any guard sees them"
 
 
 @pytest.mark.parametrize("subject", SUBJECTS)

@@ -25,8 +25,10 @@ def python(arguments: list[str], repository: Path, folder: Path) -> None:
 
 def flown(folder: Path, name: str) -> None:
     sources = sorted(str(path.relative_to(folder)) for path in (folder / "src").glob("*.c"))
+    subprocess.run([*STRICT, "-c", *sources], cwd=folder, check=True)
+    objects = [f"{Path(source).stem}.o" for source in sources]
     for program in (f"{name}_loop", f"{name}_plan_replay", "example"):
-        subprocess.run([*STRICT, f"{program}.c", *sources, "-lm", "-o", program], cwd=folder, check=True)
+        subprocess.run([*STRICT, f"{program}.c", *objects, "-lm", "-o", program], cwd=folder, check=True)
         done = subprocess.run([f"./{program}"], cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout
 
