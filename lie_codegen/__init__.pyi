@@ -72,6 +72,7 @@ from .control import manifold_law as manifold_law
 from .control import observer as observer
 from .control import output_feedback_law as output_feedback_law
 from .control import pointing_law as pointing_law
+from .control import quaternion_law as quaternion_law
 from .control import read_law as read_law
 from .control import reference as reference
 from .control import rigid_gains as rigid_gains

@@ -27,6 +27,7 @@ from .manifold_law import manifold_law as manifold_law
 from .observer import observer as observer
 from .output_feedback import output_feedback_law as output_feedback_law
 from .pointing_law import pointing_law as pointing_law
+from .quaternion_law import quaternion_law as quaternion_law
 from .reference_kernels import reference as reference
 from .tracking_law import tracking_law as tracking_law
 from .tracking_region import attitude_constants as attitude_constants

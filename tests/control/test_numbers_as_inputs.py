@@ -79,6 +79,7 @@ LAWS: dict[str, tuple[Callable[..., Kernel], dict[str, Any], dict[str, Any]]] = 
                  {"K_p": D, "K_d": J, "rate": (1, 2, 3, 4, 5, 6)}, {"start": "state", "basis": "feedforward"}),
     "hybrid": (lambda **k: lc.hybrid_law(**{"inertia": J, "K_p": (1, 2, 3), "K_d": D, **k}), {"inertia": D, "K_d": J},
                dict.fromkeys(("K_p", "kappa", "direction", "hysteresis"), "gap")),
+    "quaternion": (lambda **k: lc.quaternion_law(**{"inertia": J, "k_p": 2, "K_d": D, **k}), {"inertia": D, "k_p": 3, "K_d": J, "hysteresis": 0.25}, {}),
     "manifold": (lambda **k: lc.manifold_law(lc.manifold(3, ["q1^2 + q2^2 + q3^2 - 1"]), phi="a*(1 - q1*r1 - q2*r2 - q3*r3)", transport=sphere(),
                  K_d=k.get("K_d", 2), parameters={"a": k.get("a", 3)}), {"K_d": D, "a": 2}, {}),
     "manipulator": (lambda **k: lc.manipulator_law(ARM, K_p=k.get("K_p", 2), K_d=k.get("K_d", 3), potential="m*g*sin(q1)",
