@@ -19,6 +19,7 @@ WORK = {
     "sampled": "lc.closed_loop('so3', law=law, inertia=(1, 2, 3), runs=20000, t=t, sample=0.01, noise={'X': 1e-3})",
     "continuous": "lc.closed_loop('so3', law=law, inertia=(1, 2, 3), xi0=np.ones((20000, 3)), t=t, step=0.01)",
     "direct": "lc.steer('so3', (0.1, 0.2, 0.3), ('w1', 'w2'), 1.0, method='direct', starts=200000, bounds=30)",
+    "gate": "lc.steer(lc.pauli(3), toffoli, ('XII', 'YII', 'IXI', 'IYI', 'IIX', 'IIY'), 12.0, drift={'ZZI': 1, 'IZZ': 1}, bounds=4)",
     "ocp": "long.solve(goal=goal, starts=4000, tolerance=0.0)",
 }
 #: Seconds before the key is pressed.
@@ -35,6 +36,7 @@ step = lc.build(lc.rkmk4_step("so3")).rkmk4_step
 step.scan_batch(many[:9], u, u, u, 1e-3, n=10)
 law = lc.attitude_law("pd", inertia=(1, 2, 3), k_p=4, k_d=6)
 long = lc.ocp("se2", controls=("omega", "vx"), duration=1.0, intervals=800, stage_cost="norm2(u)", target="goal")
+toffoli = lc.UpToPhase(np.eye(8)[[0, 1, 2, 3, 4, 5, 7, 6]])
 goal = np.array([[0, -1, 0.1], [1, 0, 2], [0, 0, 1]])
 if NAME == "ocp":
     long.machine()

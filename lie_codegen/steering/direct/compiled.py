@@ -42,7 +42,11 @@ def machine(group: MatrixGroup, controls: int) -> Machine:
         return {_CORE: (template_folder() / _CORE).read_text(encoding="utf-8"), _SIZES: sizes}
 
     library = build_source(files, _CORE, namespace="direct_core", definition=sizes)
-    return NumpySearch() if library is None else CompiledSearch(load_library(library), group.degree, parts, group.dim)
+    return (
+        NumpySearch()
+        if library is None
+        else CompiledSearch(load_library(library), group.degree, parts, group.dim, controls)
+    )
 
 
 class _Programme(ctypes.Structure):
@@ -66,8 +70,8 @@ class _Programme(ctypes.Structure):
     )  # fmt: skip
 
 
-#: Exponentials of a call that may take a second.
-_LONG = 2**20
+#: Multiplications of a call that may take a tenth of a second, two matrix products of an exponential and of each derivative.
+_LONG = 2**26
 
 
 class CompiledSearch:
@@ -75,9 +79,10 @@ class CompiledSearch:
 
     compiled = True
 
-    def __init__(self, library: ctypes.CDLL, degree: int, parts: int, dim: int) -> None:
+    def __init__(self, library: ctypes.CDLL, degree: int, parts: int, dim: int, controls: int) -> None:
         self._degree, self._dim = degree, dim
         self._kind: Any = complex if parts == 2 else float
+        self._products = (1 + controls) * degree**3 * parts**2
         void, count = ctypes.c_void_p, ctypes.c_int
         self._memory = library["direct_memory"]
         self._memory.argtypes, self._memory.restype = (void,), ctypes.c_size_t
@@ -116,7 +121,8 @@ class CompiledSearch:
         memory = np.empty(self._memory(address) + _ALIGNED // 8)
         lent = memory.ctypes.data + -memory.ctypes.data % _ALIGNED
         pointers = [a.ctypes.data for a in (controls, *others)]
-        work = len(controls) * record.exponentials * max(settings.reach_iterations, settings.descend_iterations)
+        iterations = max(settings.reach_iterations, settings.descend_iterations)
+        work = len(controls) * record.exponentials * iterations * self._products
 
         def run() -> tuple[Any, ...]:
             self._functions[name](address, len(controls), *pointers, lent)
