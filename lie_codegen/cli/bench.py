@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -21,6 +22,9 @@ def bench(
     ] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
     only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
+    against: Annotated[
+        Path | None, typer.Option(help="A checkout of another commit, timed in turn with this one.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Time calls, batches, loops and cold starts against numba, jax, SymForce, CasADi, ...; ratios to ours."""
@@ -40,7 +44,7 @@ def bench(
     from lie_codegen.benchmarks.run import bench as measure
 
     with progress("bench") as report:
-        result = measure(rounds, report, only)
+        result = measure(rounds, report, only, against)
     emit(_text(result), asdict(result), json)
 
 

@@ -133,6 +133,18 @@ def test_the_cold_programs_are_python() -> None:
     ast.parse((template_folder() / "bench_cold_numba.py").read_text(encoding="utf-8"))
 
 
+def test_another_checkout_stands_beside_the_faster_of_our_two_runs(tmp_path: Path) -> None:
+    def row(nanoseconds: float) -> Row:
+        return Row("call", "f", "ns", timings_of({"lie_codegen": [nanoseconds] * 3, "numba": [10.0] * 3}))
+
+    found = bench._beside(row(4.0), row(3.0), row(2.0), "old")
+    assert found.timings["lie_codegen, old"].nanoseconds.middle == 3.0
+    assert found.timings["lie_codegen, old"].ratio.middle == 1.5
+    assert found.timings.keys() == {"lie_codegen", "numba", "lie_codegen, old"}
+    with pytest.raises(InputError, match="no checkout"):
+        bench.bench(only="Monte Carlo", against=tmp_path)
+
+
 @needs_compiler
 @pytest.mark.slow
 def test_a_section_in_a_process_of_its_own() -> None:
