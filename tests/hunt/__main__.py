@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.hunt import faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
+from tests.hunt import analysers, faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
 
 PAGE = Path(__file__).resolve().parents[2] / "SECURITY.md"
 BEGIN, END = "<!-- hunt: begin -->", "<!-- hunt: end -->"
@@ -43,6 +43,9 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
     found["planted and tampered files of the cache"] = lambda: faults.planted(home / "planted")
     found["strict compilations: compilers, float, one lane, foreign targets"] = lambda: warnings_matrix.hunt(
         home / "matrix"
+    )
+    found[f"packages under {', '.join(analysers.tools())} (with sanitizers)"] = lambda: analysers.hunt(
+        home / "analysed"
     )
     return found
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.hunt import __main__ as whole
-from tests.hunt import faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
+from tests.hunt import analysers, faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
 
 SECURITY = Path(__file__).resolve().parents[2] / "SECURITY.md"
 
@@ -84,6 +84,15 @@ def test_kills_and_planted_files(tmp_path: Path) -> None:
     for tried, found in (faults.kills(40), faults.planted(tmp_path), faults.hunt(40)):
         assert tried
         assert not found, "\n".join(found)
+
+
+@pytest.mark.slow
+def test_analysers_have_nothing_to_say(tmp_path: Path) -> None:
+    if not analysers.tools():
+        pytest.skip("no gcc, cppcheck, clang-tidy, valgrind")
+    tried, found = analysers.hunt(tmp_path)
+    assert tried >= 4
+    assert not found, "\n".join(found)
 
 
 def test_the_page_has_the_figures_of_the_last_hunt() -> None:
