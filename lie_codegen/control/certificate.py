@@ -185,7 +185,7 @@ def certificate(
     """The certificate of a tracking loop on a level of W.
 
     Args:
-        group, inertia, error, gains, feedforward: as `tracking_law`; or `law`, which has them in its definition.
+        group, inertia, error, gains, feedforward: as `tracking_law`; or `law` alone, which has them in its definition.
         level: of W, below L; half of L if not given. b_1 grows without bound as it nears L.
         state: (X, xi, X_d, xi_d) instead of a level: the level is W there.
         speed: the largest |nu|_I of the reference velocity, transported.
@@ -208,6 +208,18 @@ def certificate(
                 "loop; lc.loop_margins gives its margins, and gains whose force stays below the limits need no clipping"
             )
     if law is not None:
+        told = {
+            "inertia": inertia,
+            "error": error,
+            "gains": gains,
+            "feedforward": None if feedforward == "levi_civita" else feedforward,
+        }
+        twice = [name for name, value in told.items() if value is not None]
+        if twice:
+            raise InputError(
+                f"certificate: {twice[0]} beside law: the law has its own, and with another the loop is not the one that is certified; "
+                "give the law alone, or everything but the law"
+            )
         inertia, error, gains, feedforward = _of_law(law, group)
     if inertia is None or error is None or gains is None:
         raise InputError("certificate needs inertia, error and gains, or a law made by lc.tracking_law")

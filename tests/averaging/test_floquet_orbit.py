@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanical_systems import pendulum
 from scipy.integrate import solve_ivp
 
 import lie_codegen as lc
@@ -119,6 +120,31 @@ def test_a_kernel_with_parameters():
     orbit = lc.floquet(kernel, guess=(0, 0), period="2*pi", parameters={"a": 0.5})
     np.testing.assert_allclose(orbit.start, [0, 2], atol=1e-12)  # x = 2 sin t
     assert orbit.multipliers.prod().real == pytest.approx(np.exp(-np.pi), rel=1e-10)
+
+
+def test_a_vibrated_loop_is_its_true_system():
+    """Kapitza's pendulum upright, th'' = 9.81 sin th - 0.2 th' + sin th u(t/eps)/eps: SciPy's flow, and the average's spring."""
+    u = lc.PeriodicInput(["beta*cos(t) + 2*sin(2*t)"], period="2*pi", parameters=("beta",))
+    design = lc.vibrational_average(pendulum(), u)
+    errors = []
+    for eps in (0.05, 0.0125):
+        orbit = lc.floquet(design, guess=(0.05, 0.0), parameters={"eps": eps, "beta": 6})
+        assert orbit.period == pytest.approx(2 * np.pi * eps)
+
+        def f(t, y, eps=eps):
+            drive = (6 * np.cos(t / eps) + 2 * np.sin(2 * t / eps)) / eps
+            return [y[1], 9.81 * np.sin(y[0]) - 0.2 * y[1] + np.sin(y[0]) * drive]
+
+        np.testing.assert_allclose(orbit.monodromy, by_differences(f, orbit.start, orbit.period), atol=1e-7)
+        # the mean square of the primitive of u is 6^2/2 + 1^2/2: V'' = 18.5 - 9.81, damped by c / 2
+        frequency = np.sqrt(18.5 - 9.81 - 0.01)
+        np.testing.assert_allclose(orbit.exponents.real, -0.1, atol=1e-9)
+        errors.append(abs(abs(orbit.exponents[0].imag) - frequency))
+        assert orbit.stable
+    assert errors[1] < errors[0] / 3.5  # O(eps), eps a quarter
+    assert not lc.floquet(design, guess=(0.0, 0.0), parameters={"eps": 0.0125, "beta": 2}).stable
+    with pytest.raises(InputError, match="eps"):
+        lc.floquet(design, guess=(0.0, 0.0))
 
 
 def test_refusals():

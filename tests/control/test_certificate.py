@@ -132,6 +132,9 @@ def test_what_is_not_covered_is_refused() -> None:
         lc.certificate("so3", law=integral)
     law = lc.tracking_law("so3", **LOOP, feedforward="levi_civita")
     assert lc.certificate("so3", law=law, level=4.5, prove=False).b_1 == found(level=4.5).b_1
+    for other in ({"inertia": 2 * INERTIA}, {"gains": GAINS}, {"error": "so3_left"}, {"feedforward": "basic"}):
+        with pytest.raises(InputError, match="beside law"):
+            lc.certificate("so3", law=law, **other)
 
 
 def simulated(cert: Any, starts: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
