@@ -85,11 +85,20 @@ def _guard(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     return guarded
 
 
+_given_warnings = [0]
+
+
+def warnings_given() -> int:
+    """How many times this process has warned, heard or not: what was warned of is made again every time, and warned of again."""
+    return _given_warnings[0]
+
+
 def warn_caller(message: str, category: type[Warning]) -> None:
     """Warn at the line of the user's code that led here, however many functions of ours lie between (a stacklevel would have to count them).
 
     The nearest frame that is not ours, of Python's own library or of what we compute with; the outermost if there is none.
     """
+    _given_warnings[0] += 1
     frame = sys._getframe(1)
     while _belongs_inside(frame) and frame.f_back is not None:
         frame = frame.f_back

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lie_codegen.errors import AlgebraError, InputError, JacobiError
-from lie_codegen.exact.numbers import Number
+from lie_codegen.exact.numbers import Number, exact_number
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.on_demand import sympy as sp
 
@@ -51,19 +52,47 @@ class LieAlgebra:
                 raise AlgebraError(f"{self.name}: bracket ({i}, {j}) -> {dict(row)} is out of range")
         self._check_jacobi()
 
+    @classmethod
+    def recorded(cls, name: str, labels: tuple[str, ...], constants: Sequence[Sequence[Any]]) -> LieAlgebra:
+        """The algebra of which `record` was taken: proved then, and not again; its exact table is read when it is asked for."""
+        algebra = cls.__new__(cls)
+        numbers = np.zeros((len(labels),) * 3)
+        for i, j, k, _, value in constants:
+            numbers[i, j, k], numbers[j, i, k] = value, -value
+        numbers.setflags(write=False)
+        algebra.__dict__.update(name=name, labels=labels, structure_constants=numbers, _recorded=constants)
+        return algebra
+
+    @property
+    def record(self) -> list[list[Any]]:
+        """[i, j, k, c[i, j, k] as a text, as a double] for i < j where it is not zero."""
+        if "_recorded" in self.__dict__:
+            return list(self.__dict__["_recorded"])
+        return [[i, j, k, str(value), float(value)] for (i, j), row in self.table.items() for k, value in row.items()]
+
+    if not TYPE_CHECKING:  # for a type checker no name is found that is not written above
+
+        def __getattr__(self, name: str) -> Any:
+            """The table of a recorded algebra, the one thing that is not there from the start."""
+            if name != "table" or "_recorded" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            table: dict[tuple[int, int], dict[int, Number]] = {}
+            for i, j, k, text, _ in self.__dict__["_recorded"]:
+                table.setdefault((i, j), {})[k] = exact_number(text)
+            self.__dict__["table"] = table
+            return table
+
     def __hash__(self) -> int:
         return self._hash
 
     @cached_property
     def _hash(self) -> int:
-        # Groups are the keys of what is compiled, in every call; the table of su(8) alone takes a millisecond.
-        return hash(
-            (self.name, self.labels, frozenset((key, frozenset(row.items())) for key, row in self.table.items()))
-        )
+        # Groups are the keys of what is compiled, in every call. Equal tables have equal doubles.
+        return hash((self.name, self.labels, self.structure_constants.tobytes()))
 
-    def __getstate__(self) -> dict[str, object]:
+    def __reduce__(self) -> tuple[Any, ...]:
         # Without the hash: that of a text is another one in another process.
-        return {"name": self.name, "labels": self.labels, "table": self.table}
+        return LieAlgebra.recorded, (self.name, self.labels, self.record)
 
     @property
     def dim(self) -> int:

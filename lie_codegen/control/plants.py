@@ -29,13 +29,15 @@ from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.definition import record_factory
+from lie_codegen.kernel.definition import NoDefinitionError, plain, record_factory
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, dot
-from lie_codegen.kernel.parameter import Parameter, parameter
+from lie_codegen.kernel.parameter import INPUT, Parameter, parameter
 from lie_codegen.mechanics.kernels import acceleration
 from lie_codegen.mechanics.states import initial_states, split_states
+from lie_codegen.runtime.records import find_record, store_record
 
 
 class Plant(Protocol):
@@ -105,16 +107,23 @@ class GroupPlant:
     Attributes:
         group: the group.
         order: 1 or 2.
-        metric: the inertia, for order 2.
+        inertia: for order 2, plain data as in a definition, or "input".
     """
 
     group: MatrixGroup
     order: int
-    metric: Parameter | None = None
+    inertia: Any = None
 
     @property
     def namespace(self) -> str:
         return self.group.name
+
+    @cached_property
+    def metric(self) -> Parameter | None:
+        """The inertia, exact."""
+        if self.order == 1:
+            return None
+        return parameter(_inertia_port(self.group.dim), self.inertia, read_inertia(self.group.dim))
 
     @cached_property
     def sizes(self) -> tuple[int, int, int]:
@@ -131,9 +140,10 @@ class GroupPlant:
 
     @cached_property
     def numbers(self) -> tuple[Port, ...]:
-        if self.metric is None or self.metric.value is not None:
+        if self.inertia != INPUT:
             return ()
-        return self.metric.port, Port("inertia_inverse", self.metric.port.shape)
+        port = _inertia_port(self.group.dim)
+        return port, Port("inertia_inverse", port.shape)
 
     def opened(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
         size, speed, _ = self.sizes
@@ -217,5 +227,17 @@ def group_plant(group: Any, inertia: Any = None, order: int = 2) -> GroupPlant:
         return GroupPlant(group, 1)
     if inertia is None:
         raise InputError(f"closed_loop: the law commands a force: give inertia= of the body on {group.name}")
-    port = Port("inertia", (group.dim, group.dim), description="of the body, symmetric")
-    return GroupPlant(group, 2, parameter(port, inertia, read_inertia(group.dim)))
+    try:
+        given = plain(inertia)
+    except NoDefinitionError:
+        raise InputError(f"closed_loop: inertia is {shown(inertia)}; give numbers") from None
+    # One that was found symmetric and positive definite before, in this process or another, is so.
+    source = [group.dim, given]
+    if given != INPUT and find_record("inertia", source) is None:
+        parameter(_inertia_port(group.dim), inertia, read_inertia(group.dim))
+        store_record("inertia", source, True)
+    return GroupPlant(group, 2, given)
+
+
+def _inertia_port(n: int) -> Port:
+    return Port("inertia", (n, n), description="of the body, symmetric")

@@ -209,7 +209,9 @@ def _known_by(what: Buildable) -> str | None:
 
         return source_definition(definition_source(what))
     group, kernels = _group_or_kernels(what)
-    return object_definition(group) if group is not None else defined_together(kernels)
+    if group is not None:
+        return f"{group.description}\n{object_definition(group)}"  # the header shows the description
+    return defined_together(kernels)
 
 
 def _steering(group: MatrixGroup, controls: Sequence[str | int] | Literal[True]) -> dict[str, str]:

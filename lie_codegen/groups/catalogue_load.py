@@ -11,6 +11,7 @@ from lie_codegen.groups.catalogue_names import definition_source, group_path, is
 from lie_codegen.groups.families import family
 from lie_codegen.groups.group_file import parse_group_file
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.groups.recorded import recorded
 
 #: What every function takes in the place of a group: the group, its name, or its file.
 GroupLike = MatrixGroup | str | Path
@@ -70,9 +71,9 @@ def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:
 
 @lru_cache(maxsize=64)
 def _parsed(data: bytes, where: str) -> MatrixGroup:
-    return parse_group_file(data, where)
+    return recorded(["file", data.decode("utf-8", errors="replace")], lambda: parse_group_file(data, where))
 
 
 @lru_cache(maxsize=64)
 def _generated(name: str) -> MatrixGroup:
-    return family(name)
+    return recorded(["family", name], lambda: family(name))

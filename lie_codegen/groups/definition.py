@@ -11,6 +11,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.recorded import recorded
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier, shown
 from lie_codegen.kernel.definition import makes_records
@@ -83,7 +84,8 @@ def defined_group(name: str, labels: Sequence[str], matrices: Sequence[Any], uni
 
 @lru_cache(maxsize=64)
 def _made(name: str, labels: tuple[str, ...], matrices: tuple[Any, ...], units: tuple[str, ...]) -> MatrixGroup:
-    return from_matrices(name, labels, matrices, units=units)
+    source = ["definition", name, labels, matrices, units]
+    return recorded(source, lambda: from_matrices(name, labels, matrices, units=units))
 
 
 def exact_matrix(where: str, rows: Any) -> sp.ImmutableMatrix:

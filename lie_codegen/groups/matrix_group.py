@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from lie_codegen.algebra.constructions import permutation, reorder_algebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
+from lie_codegen.exact.numbers import exact_number
 from lie_codegen.kernel.casadi_functions import CasadiFunctions
 from lie_codegen.kernel.definition import Definition, definition_of
 from lie_codegen.kernel.kernel import Kernel
@@ -24,9 +26,9 @@ from lie_codegen.on_demand import sympy as sp
 KERNELS, STEP = "lie_codegen.groups.kernels", "lie_codegen.groups.maps.rkmk"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MatrixGroup:
-    """Connected matrix Lie group whose algebra has basis A_1..A_n.
+    """Connected matrix Lie group whose algebra has basis A_1..A_n. Groups are equal whose definitions are.
 
     Attributes:
         algebra: exact structure constants.
@@ -58,7 +60,7 @@ class MatrixGroup:
     @property
     def degree(self) -> int:
         """d, the size of the matrices."""
-        return int(self.exact_basis[0].rows)
+        return len(self.definition["parameters"]["matrices"][0])
 
     @cached_property
     def is_complex(self) -> bool:
@@ -154,14 +156,65 @@ class MatrixGroup:
         }
         return definition_of("lie_codegen.groups.definition:defined_group", {"name": self.name, **rows})
 
+    def __eq__(self, other: object) -> bool:
+        return self.definition == other.definition if isinstance(other, MatrixGroup) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.definition)
+
     def __reduce__(self) -> tuple[Any, ...]:
-        return MatrixGroup, (self.algebra, self.exact_basis, self.units, self.description)
+        return MatrixGroup.recorded, (self.record,)
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """Plain data from which `recorded` makes the group again, without deriving or proving anything."""
+        numbers = self.basis
+        parts = [numbers.real.tolist(), numbers.imag.tolist()] if self.is_complex else [numbers.tolist()]
+        return {
+            "definition": json.loads(self.definition.text),
+            "text": self.definition_text,
+            "description": self.description,
+            "constants": self.algebra.record,
+            "basis": parts,
+        }
+
+    @classmethod
+    def recorded(cls, record: Mapping[str, Any]) -> MatrixGroup:
+        """The group of which the record was taken; its exact basis is read when it is asked for."""
+        definition = definition_of(record["definition"]["kind"], record["definition"]["parameters"])
+        given = definition["parameters"]
+        parts = [np.array(part) for part in record["basis"]]
+        basis = parts[0] + 1j * parts[1] if len(parts) > 1 else parts[0]
+        basis.setflags(write=False)
+        group = cls.__new__(cls)
+        group.__dict__.update(
+            algebra=LieAlgebra.recorded(given["name"], given["labels"], record["constants"]),
+            units=given["units"],
+            description=record["description"],
+            definition=definition,
+            definition_text=record["text"],
+            is_complex=len(parts) > 1,
+            basis=basis,
+            record=record,
+        )
+        return group
+
+    if not TYPE_CHECKING:  # for a type checker no name is found that is not written above
+
+        def __getattr__(self, name: str) -> Any:
+            """The exact basis of a recorded group, the one thing that is not there from the start."""
+            if name != "exact_basis" or "record" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            rows = self.definition["parameters"]["matrices"]
+            exact = tuple(sp.ImmutableMatrix([[exact_number(entry) for entry in row] for row in m]) for m in rows)
+            self.__dict__["exact_basis"] = exact
+            return exact
 
     @cached_property
     def definition_text(self) -> str:
-        """Canonical text of everything the derived code depends on; equal texts give equal code."""
+        """Canonical text of everything the derived code depends on; equal groups have equal texts, and these give equal code."""
         rows = [f"{label} [{unit}] = {matrix.tolist()}" for label, unit, matrix in self._rows()]
-        return "\n".join([self.name, self.description, *rows])
+        return "\n".join([self.name, *rows])
 
     def _rows(self) -> Any:
         return zip(self.labels, self.units, self.exact_basis, strict=True)

@@ -27,6 +27,10 @@ from lie_codegen.errors import InputError
 
 #: The kind of a group, and the length from which a fraction is shown with its decimal.
 _GROUP, _LONG = "lie_codegen.groups.definition:defined_group", 8
+#: Where kernels that were made before are found, above this file: named here and loaded when a factory is called.
+RECORDED = "lie_codegen.runtime.recorded_kernels"
+#: An exponent that no number of a law or a body has: a fraction of such a text fills the memory.
+_HUGE = re.compile(r"[eE][+-]?[0-9_]{4,}\s*$")
 Factory = TypeVar("Factory", bound=Callable[..., Any])
 #: Units of the numbers by parameter, or what tells them from the parameters.
 Units = Mapping[str, str] | Callable[[Mapping[str, Any]], Mapping[str, str]]
@@ -95,6 +99,8 @@ def plain(value: Any) -> Any:
 
 def _text(value: str) -> Any:
     """A number written as a text is that number: "0.5" and "1/2" are equal."""
+    if _HUGE.search(value):
+        return value
     try:
         return _rational(Fraction(value))
     except (ValueError, ZeroDivisionError):
@@ -200,7 +206,8 @@ def kernel_factory(*, units: Units | None = None, **reads: Callable[[Any], Any])
         reads: argument -> function that reads it first, as a group from its name.
     """
 
-    def define(made: Any, definition: Definition) -> Any:
+    def define(function: Callable[[], Any], definition: Definition) -> Any:
+        made = import_module(RECORDED).recorded_kernel(definition, function)
         if not isinstance(made, tuple):
             return made.defined_by(definition)
         members = [Definition({**definition, "member": each.name}) for each in made]
@@ -216,7 +223,8 @@ def record_factory(**reads: Callable[[Any], Any]) -> Callable[[Factory], Factory
     `dataclasses.replace` makes another record, which has none; so a definition is always true.
     """
 
-    def define(made: Any, definition: Definition) -> Any:
+    def define(function: Callable[[], Any], definition: Definition) -> Any:
+        made = function()
         object.__setattr__(made, "definition", definition)  # beside the fields, so that neither == nor repr sees it
         return made
 
@@ -230,7 +238,9 @@ def makes_records(function: Factory) -> Factory:
 
 
 def _factory_of(
-    define: Callable[[Any, Definition], Any], units: Units | None, reads: Mapping[str, Callable[[Any], Any]]
+    define: Callable[[Callable[[], Any], Definition], Any],
+    units: Units | None,
+    reads: Mapping[str, Callable[[Any], Any]],
 ) -> Callable[[Factory], Factory]:
     def decorate(function: Factory) -> Factory:
         signature = inspect.signature(function)
@@ -242,11 +252,11 @@ def _factory_of(
             bound.apply_defaults()
             for name, read in reads.items():
                 bound.arguments[name] = read(bound.arguments[name])
-            made = function(*bound.args, **bound.kwargs)
+            made = functools.partial(function, *bound.args, **bound.kwargs)
             try:
                 parameters = plain(_arguments(signature, bound))
             except NoDefinitionError:
-                return made
+                return made()
             shown = units(parameters) if callable(units) else units
             return define(made, definition_of(kind, parameters, shown))
 

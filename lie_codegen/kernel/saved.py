@@ -68,6 +68,28 @@ def load(path: str | Path) -> Any:
     return _decoded(header["value"], entries, str(path))
 
 
+def record_of(value: Any) -> Any:
+    """A value without arrays as plain JSON data, from which `value_of` makes it again.
+
+    Raises:
+        InputError: it holds an array, or what is no data.
+    """
+    arrays: dict[str, Array] = {}
+    record = _encoded(value, arrays, type(value).__name__)
+    if arrays:
+        raise InputError(f"{type(value).__name__} holds arrays; save it to a file")
+    return record
+
+
+def value_of(record: Any) -> Any:
+    """The value of a record of `record_of`.
+
+    Raises:
+        InputError: it is none.
+    """
+    return _decoded(record, {}, "the record")
+
+
 def table_text(columns: Mapping[str, Array]) -> str:
     """CSV with a header line; numbers to the last bit."""
     out = io.StringIO()

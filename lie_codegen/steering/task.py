@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -11,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.algebra.controllability import Controllability, control_indices, controllability
-from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, SteeringInputError, UncontrollableError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.identifiers import shown
+from lie_codegen.kernel.saved import record_of, value_of
+from lie_codegen.runtime.records import find_record, store_record
 from lie_codegen.steering.accessibility import with_drift
 
 #: Durations in seconds that double precision carries.
@@ -99,7 +101,7 @@ def make_task(
         ShapeError, NotFiniteError, NotOnGroupError: about the target.
     """
     require_group(group, "steer")
-    report = _reach(group.algebra, control_indices(group.algebra, controls))
+    report = reach(group, control_indices(group.algebra, controls))
     if not report.controllable and not torques:
         _require_drift_helps(group, report, drift)
     check_duration(duration, f"steer({group.name})")
@@ -110,8 +112,16 @@ def make_task(
 
 
 @lru_cache(maxsize=64)
-def _reach(algebra: LieAlgebra, controls: tuple[int, ...]) -> Controllability:
-    return controllability(algebra, controls)
+def reach(group: MatrixGroup, controls: tuple[int, ...]) -> Controllability:
+    """The report, exact: made, or from its record in the cache."""
+    source = [group.definition.text, controls]
+    with contextlib.suppress(InputError):
+        found = value_of(find_record("controllability", source))
+        if isinstance(found, Controllability):
+            return found
+    report = controllability(group.algebra, controls)
+    store_record("controllability", source, record_of(report))
+    return report
 
 
 def _require_drift_helps(group: MatrixGroup, report: Controllability, drift: Any) -> None:

@@ -27,7 +27,8 @@ def derived(name: str) -> dict[str, Any]:
     """The store of a group and the shared file, by a process of its own."""
     command = [sys.executable, "-m", "tests.tools.derive_traced", name]
     root = Path(__file__).resolve().parent.parent.parent
-    environment = {**os.environ, "PYTHONPATH": str(Path(lc.__file__).parent.parent)}
+    # Without a cache: what is found there is not derived, and so not observed.
+    environment = {**os.environ, "PYTHONPATH": str(Path(lc.__file__).parent.parent), "LIE_CODEGEN_CACHE": os.devnull}
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root, env=environment)
     data: dict[str, Any] = json.loads(done.stdout)
     return data

@@ -16,8 +16,8 @@ def varying_entries(group: MatrixGroup) -> tuple[tuple[int, int], ...]:
 
     X = I + products of basis matrices, so the pattern is the closure of theirs under multiplication.
     """
-    d = group.degree
-    basis = {(i, j) for matrix in group.exact_basis for i in range(d) for j in range(d) if matrix[i, j] != 0}
+    matrices = group.definition["parameters"]["matrices"]
+    basis = {(i, j) for rows in matrices for i, row in enumerate(rows) for j, entry in enumerate(row) if entry != 0}
     pattern = set(basis)
     while True:
         more = {(i, j) for i, k in pattern for m, j in basis if k == m} - pattern

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.algebra.controllability import require_controllable
+from lie_codegen.algebra.controllability import control_indices, require_controllable
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -29,6 +29,7 @@ from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import CALLS, in_parts, interruptible
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import Extremals
+from lie_codegen.steering.task import reach
 
 _NODES = 32
 
@@ -119,7 +120,9 @@ def shooter(group: GroupLike, controls: Sequence[int | str]) -> Shooter:
 
 @lru_cache(maxsize=16)
 def _shooter(group: MatrixGroup, controls: tuple[int | str, ...]) -> Shooter:
-    report = require_controllable(group.algebra, controls)
+    report = reach(group, control_indices(group.algebra, controls))
+    if not report.controllable:
+        require_controllable(group.algebra, controls)
 
     def files() -> dict[str, str]:
         from lie_codegen.steering.shooting.source import render_steering, steering_view
