@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import importlib
 import importlib.util
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,18 +30,30 @@ _BOTH = {
     "SIN": "m.sin({0})", "COS": "m.cos({0})", "TAN": "m.tan({0})", "SINH": "m.sinh({0})", "COSH": "m.cosh({0})",
     "TANH": "m.tanh({0})", "FABS": "m.fabs({0})", "LT": "{0} < {1}", "LE": "{0} <= {1}", "EQ": "{0} == {1}",
 }  # fmt: skip
+
+
+def _literal(value: float) -> str:
+    """A double in Python, infinity and NaN by the module's names."""
+    return repr(value) if math.isfinite(value) else f"(-m.{-value})" if value < 0 else f"m.{value}"
+
+
 SCALAR = Target(
     "numba",
     {**_BOTH, "ATAN2": "m.atan2({0}, {1})", "NOT": "not {0}", "SELECT": "{1} if {0} else {2}", "IF_ELSE_ZERO": "{1} if {0} else 0.0"},
-    repr,
+    _literal,
 )  # fmt: skip
 ARRAYS = Target(
     "arrays",
     {**_BOTH, "ATAN2": "m.arctan2({0}, {1})", "NOT": "m.logical_not({0})", "SELECT": "m.where({0}, {1}, {2})",
      "IF_ELSE_ZERO": "m.where({0}, {1}, 0.0)"},
-    repr,
+    _literal,
     "{0}[..., {1}]",
 )  # fmt: skip
+
+
+def is_there(name: str) -> bool:
+    """Whether the module of a peer is installed."""
+    return importlib.util.find_spec(name.partition(".")[0]) is not None
 
 
 def need(name: str) -> Any:
@@ -49,7 +62,7 @@ def need(name: str) -> Any:
     Raises:
         AbsentError: it is not installed.
     """
-    if importlib.util.find_spec(name.partition(".")[0]) is None:
+    if not is_there(name):
         raise AbsentError("not installed")
     return importlib.import_module(name)
 

@@ -24,6 +24,7 @@ from lie_codegen.benchmarks.kernels import kernel_rows
 from lie_codegen.benchmarks.limits import Limits, keep_to_one_core, limits, machine
 from lie_codegen.benchmarks.loops import monte_carlo_row, trajectory_row
 from lie_codegen.benchmarks.rows import Row
+from lie_codegen.benchmarks.study_row import study_row
 from lie_codegen.benchmarks.timing import Spread, Timing
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.catalogue_load import group as load
@@ -41,7 +42,7 @@ KERNELS: Mapping[str, Callable[[], Kernel]] = {
     "so3 attitude_law": laws.package_attitude,
 }  # fmt: skip
 #: The other sections.
-LOOPS = ("trajectory in coordinates", "trajectory on the group", "Monte Carlo", "cold start")
+LOOPS = ("trajectory in coordinates", "trajectory on the group", "Monte Carlo", "study", "cold start")
 SECTIONS = (*KERNELS, *LOOPS)
 Report = Callable[[str], None]
 
@@ -137,6 +138,8 @@ def section(title: str, rounds: int) -> list[Row]:
             return [cold_row(folder, max(3, rounds // 3))]
         if title == "trajectory on the group":
             return [group_row(folder, rounds)]
+        if title == "study":
+            return [study_row(folder, rounds)]
         hand = peers.hand_written(folder)
         if title == "trajectory in coordinates":
             return [trajectory_row(folder, hand, rounds)]
