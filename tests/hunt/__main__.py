@@ -14,7 +14,17 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.hunt import analysers, faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
+from tests.hunt import (
+    analysers,
+    faults,
+    generated_c,
+    growth,
+    hostile,
+    off_manifold,
+    solver_arguments,
+    texts,
+    warnings_matrix,
+)
 
 PAGE = Path(__file__).resolve().parents[2] / "SECURITY.md"
 BEGIN, END = "<!-- hunt: begin -->", "<!-- hunt: end -->"
@@ -40,6 +50,8 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
         )
     found["faults injected: n-th write, rename, fork, lock refused, full or killed"] = lambda: faults.hunt(12 * scale)
     found["kills among eight processes on one cache with tiny limits"] = lambda: faults.kills(20 * scale)
+    found["kills of processes that write a package and a plan"] = lambda: growth.torn_writes(20 * scale)
+    found["calls of six kinds without growth of memory"] = lambda: growth.calls(1_000_000 * scale)
     found["planted and tampered files of the cache"] = lambda: faults.planted(home / "planted")
     found["strict compilations: compilers, float, one lane, foreign targets"] = lambda: warnings_matrix.hunt(
         home / "matrix"

@@ -7,7 +7,17 @@ from pathlib import Path
 import pytest
 
 from tests.hunt import __main__ as whole
-from tests.hunt import analysers, faults, generated_c, hostile, off_manifold, solver_arguments, texts, warnings_matrix
+from tests.hunt import (
+    analysers,
+    faults,
+    generated_c,
+    growth,
+    hostile,
+    off_manifold,
+    solver_arguments,
+    texts,
+    warnings_matrix,
+)
 
 SECURITY = Path(__file__).resolve().parents[2] / "SECURITY.md"
 
@@ -81,9 +91,16 @@ def test_generated_c_has_no_warning_to_give(tmp_path: Path, monkeypatch: pytest.
 
 @pytest.mark.slow
 def test_kills_and_planted_files(tmp_path: Path) -> None:
-    for tried, found in (faults.kills(40), faults.planted(tmp_path), faults.hunt(40)):
+    for tried, found in (faults.kills(40), faults.planted(tmp_path), faults.hunt(40), growth.torn_writes(20)):
         assert tried
         assert not found, "\n".join(found)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="nothing says what memory is taken")
+def test_memory_does_not_grow() -> None:
+    tried, found = growth.calls(100_000)
+    assert tried > 100_000
+    assert not found, "\n".join(found)
 
 
 @pytest.mark.slow
