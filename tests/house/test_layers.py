@@ -34,6 +34,7 @@ ALLOWED = {
     "pyarrow": {"studies"},
     "rockit": {"benchmarks"},
     "crocoddyl": {"benchmarks"},
+    "pinocchio": {"benchmarks"},
     "qutip": {"benchmarks", "steering"},
     "qutip_qtrl": {"benchmarks"},
     "mpmath": {"gallery"},
