@@ -47,7 +47,7 @@ def tracking_certificates(folder: Path, progress: Callable[[str], None] = quiet)
     )
     left.set_ylim(1e-8, 30)
     left.legend(frameon=False, fontsize=8)
-    tidy(left, "(a) W of 40 loops inside, SO(3)", y="J")
+    tidy(left, "(a) W of 40 loops inside, SO(3)", y="W [J]")
     progress("rate against overshoot")
     ks = [1.2, 1.5, 2, 2.6, 3.5, 5, 7]
     rates = [certificate("so3", **_SO3, level=4.5, overshoot=k, prove=False).rate for k in ks]
@@ -57,7 +57,7 @@ def tracking_certificates(folder: Path, progress: Callable[[str], None] = quiet)
     middle.set_xlabel("overshoot k")
     middle.set_ylabel("rate of W [1/s]")
     middle.set_title("(b) rate against overshoot, level 4.5")
-    middle.legend(frameon=False, fontsize=8, loc="center right")
+    middle.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0.02, 0.92))
     numbers["rates"] = rates
     for row in range(1, 7):
         progress(f"row {row}")
