@@ -47,10 +47,7 @@ def _entrants(folder: Path) -> Iterator[Entrant]:
     columns = Space(_space()).columns(_SEED, 0, COUNT, COUNT)
 
     def by_us() -> Work:
-        try:
-            import zarr as zarr
-        except ImportError:
-            raise AbsentError("the extra lie_codegen[study] is not installed") from None
+        peers.need("zarr")
         store = folder / "study.zarr"
 
         def work() -> Array:

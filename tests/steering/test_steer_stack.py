@@ -13,8 +13,9 @@ import pytest
 import lie_codegen as lc
 from lie_codegen.algebra.controllability import require_controllable
 from lie_codegen.steering.shooting.package import render_steering_package
-from lie_codegen.steering.shooting.source import SteeringView, steering_view
+from lie_codegen.steering.shooting.source import steering_view
 from lie_codegen.steering.shooting.stack import LANES, stack_bytes, workspace_bytes
+from lie_codegen.steering.shooting.views import SteeringView
 
 COMPILER = shutil.which("gcc")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no gcc")

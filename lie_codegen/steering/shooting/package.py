@@ -16,8 +16,9 @@ from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.shooting.lie_poisson import transport
-from lie_codegen.steering.shooting.source import PROBLEM, SteeringView, render_steering, steering_view
+from lie_codegen.steering.shooting.source import PROBLEM, render_steering, steering_view
 from lie_codegen.steering.shooting.stack import LANES, stack_bytes, workspace_bytes
+from lie_codegen.steering.shooting.views import SteeringView
 
 _VECTORS = 8
 _STEPS, _ROWS = 8, 8

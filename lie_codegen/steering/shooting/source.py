@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from lie_codegen.codegen.opcodes import C99_FORMS, Target, c_literal
 from lie_codegen.codegen.tape import Tape, tape_of
 from lie_codegen.codegen.templates import render, template_folder
-from lie_codegen.codegen.views import StatementView, comment_lines, kernel_view
+from lie_codegen.codegen.views import comment_lines, kernel_view
 from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.kernel import Kernel
@@ -22,64 +21,12 @@ from lie_codegen.steering.shooting.defaults import Defaults
 from lie_codegen.steering.shooting.lie_poisson import shooting_kernels
 from lie_codegen.steering.shooting.stack import LANES as VECTOR
 from lie_codegen.steering.shooting.stack import workspace_bytes
+from lie_codegen.steering.shooting.views import LaneKernel, SteeringView, Store
 
 #: A vector of doubles, one start a lane.
 LANES = Target("V", {op: C99_FORMS[op] for op in ("ADD", "SUB", "MUL", "DIV", "NEG", "INV", "TWICE", "SQ")}, c_literal)
 #: The header that the source includes.
 PROBLEM = "steering_problem.h"
-
-
-@dataclass(frozen=True)
-class Store:
-    """<parameter>[entry] = <value>; a literal needs spreading over the lanes."""
-
-    parameter: str
-    entry: int
-    value: str
-    is_literal: bool
-
-
-@dataclass(frozen=True)
-class LaneKernel:
-    """One static C function over lanes."""
-
-    name: str
-    formula: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    unused: tuple[str, ...]
-    statements: tuple[StatementView, ...]
-    stores: tuple[Store, ...]
-
-
-@dataclass(frozen=True)
-class SteeringView:
-    """What the templates see."""
-
-    prefix: str
-    title: str
-    labels: tuple[str, ...]
-    dim: int
-    degree: int
-    is_complex: bool
-    size: int
-    full_size: int
-    controls: tuple[int, ...]
-    identity: tuple[str, ...]
-    varying: tuple[int, ...]
-    first: tuple[int, ...]
-    second: tuple[int, ...]
-    areas: tuple[tuple[str, ...], ...]
-    cosines: tuple[str, ...]
-    quiet_rounds: int
-    is_deep: bool
-    wave_size: str
-    lengths: tuple[int, ...]
-    depth: int
-    seed_steps: int
-    relaxations: int
-    kernels: tuple[LaneKernel, ...]
-    defaults: Defaults
 
 
 def steering_view(group: MatrixGroup, controls: tuple[int, ...], depth: int) -> SteeringView:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from lie_codegen.steering.shooting.source import SteeringView
+    from lie_codegen.steering.shooting.views import SteeringView
 
 #: As in steering_core.c: lanes where the compiler has vectors, Runge-Kutta steps and candidates kept, rows of the extrapolation.
 LANES, _NODES, _KEPT, _ROWS = 8, 129, 8, 8
