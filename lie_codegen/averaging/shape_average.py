@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from lie_codegen.averaging.shape_form import ShapeForm
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.runge_kutta import ARRAYS, CLASSICAL, increment
 from lie_codegen.mechanics.advected import Advected
 from lie_codegen.mechanics.polynomial_fields import Field, PullBackSpace, gathered, integrated
 from lie_codegen.mechanics.polynomial_kernels import evaluate
@@ -83,15 +85,12 @@ class GaitAverage(Value):
             state = np.concatenate([np.zeros(n), carried.seen(Y)])
             return np.asarray(sum(eps**q * evaluate(space, f, state)[:n] for q, f in enumerate(terms, 1)))
 
+        def slope(X: Array, _: float, theta: Array) -> Array:
+            """Theta' of X exp(Theta): Munthe-Kaas's step of fourth order."""
+            return dexp_inverse(self.group.algebra, theta, velocity(X @ expm(self.group.hat(theta))))
+
         for _ in range(_FLOW_STEPS * periods):
-            # Munthe-Kaas's fourth-order step
-            stages = [velocity(X)]
-            for part in (0.5, 0.5, 1.0):
-                theta = part * h * stages[-1]
-                alpha = velocity(X @ expm(self.group.hat(theta)))
-                stages.append(dexp_inverse(self.group.algebra, theta, alpha))
-            k1, k2, k3, k4 = stages
-            X = X @ expm(self.group.hat(h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)))
+            X = X @ expm(self.group.hat(increment(ARRAYS, CLASSICAL, partial(slope, X), np.zeros(n), h)))
         return np.asarray(X)
 
 

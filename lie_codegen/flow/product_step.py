@@ -9,6 +9,7 @@ groups to rounding for |h xi| <= 1/4. Munthe-Kaas, BIT 38 (1998) 92.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import Any
 
 from lie_codegen.groups.derivation import GroupDerivation
@@ -17,7 +18,8 @@ from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import dexp_inverse
-from lie_codegen.kernel.linear import Vector, matmul, plus, scaled
+from lie_codegen.kernel.linear import Vector, matmul, plus
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 
 #: (stage, t, elements, v) -> body velocities of the elements and the rate of v; stage 0, 1, 2 at t, t + h/2, t + h.
 Rates = Callable[[int, Scalar, list[Any], Vector], tuple[list[Vector], Vector]]
@@ -40,22 +42,23 @@ def product_step(
     ops: Arithmetic, moves: Sequence[Move], elements: Sequence[Any], v: Vector, rates: Rates, t: Scalar, h: Scalar
 ) -> tuple[list[Any], Vector]:
     """The elements and the vector after a step of length h."""
-    velocities, slope = rates(0, t, list(elements), v)
-    turns, slopes, weights = [velocities], [slope], [1]
-    for stage, part, weight in ((1, h / 2, 2), (1, h / 2, 2), (2, h, 1)):
-        thetas = [scaled(part, k) for k in turns[-1]]
-        moved = [move(ops, X, theta) for move, X, theta in zip(moves, elements, thetas, strict=True)]
-        velocities, slope = rates(stage, (t, t + h / 2, t + h)[stage], moved, plus(v, scaled(part, slopes[-1])))
-        # The first stage is at Theta = 0, where the algebra's equation reads Theta' = xi: only the later ones are pulled back.
-        turns.append(
-            [dexp_inverse(ops, m.group.algebra, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)]
-        )
-        slopes.append(slope)
-        weights.append(weight)
-    shares = [h * weight / 6 for weight in weights]
-    ends = []
-    for i, move in enumerate(moves):
-        theta = plus(*[scaled(share, turn[i]) for share, turn in zip(shares, turns, strict=True)])
-        ends.append(move(ops, elements[i], theta))
-    change = plus(*[scaled(share, slope) for share, slope in zip(shares, slopes, strict=True)])
-    return ends, plus(v, change)
+    sizes = [move.group.dim for move in moves]
+
+    def rate(c: float, change: Vector) -> Vector:
+        stage = int(2 * c)
+        *thetas, shift = _split(change, sizes)
+        moved = list(elements)
+        if c:
+            moved = [move(ops, X, theta) for move, X, theta in zip(moves, elements, thetas, strict=True)]
+        velocities, slope = rates(stage, (t, t + h / 2, t + h)[stage], moved, plus(v, shift))
+        turns = [dexp_inverse(ops, m.group.algebra, a, b) for m, a, b in zip(moves, thetas, velocities, strict=True)]
+        return [entry for part in (*turns, slope) for entry in part]
+
+    *thetas, change = _split(increment(vectors(ops), CLASSICAL, rate, [0] * (sum(sizes) + len(v)), h), sizes)
+    return [move(ops, X, theta) for move, X, theta in zip(moves, elements, thetas, strict=True)], plus(v, change)
+
+
+def _split(values: Vector, sizes: Sequence[int]) -> list[Vector]:
+    """Parts of these sizes, and the rest."""
+    ends = list(accumulate(sizes, initial=0))
+    return [values[a:b] for a, b in zip(ends, [*ends[1:], None], strict=True)]

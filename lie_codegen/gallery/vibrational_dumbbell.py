@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.runge_kutta import ARRAYS, CLASSICAL, increment
 from lie_codegen.mechanics.lagrangian import lagrangian_system
 from lie_codegen.mechanics.lagrangian_step import lagrangian_variational_step
 from lie_codegen.mechanics.relative_equilibria import relative_equilibrium
@@ -209,14 +211,15 @@ def printed_actual(reduced: RouthReduction) -> tuple[float, Array]:
     kernel = Kernel("printed_actual", "dumbbell", (Port("y", (4,)), Port("t", ())), (Port("y_dot", (4,)),), body)
     rate = build(kernel)["printed_actual"]
     now, state, step, rows = 0.0, np.array(_START), 2 * np.pi / _OMEGA / 400, []
+
+    def slope(state: Array, now: float, c: float, change: Array) -> Array:
+        return np.asarray(rate(state + change, now + c * step))
+
     while now < 5:
         rows.append([now, *state])
         if abs(state[1] - np.pi / 2) > np.pi:
             break
-        k1 = rate(state, now)
-        k2 = rate(state + step / 2 * k1, now + step / 2)
-        k3 = rate(state + step / 2 * k2, now + step / 2)
-        state = state + step / 6 * (k1 + 2 * k2 + 2 * k3 + rate(state + step * k3, now + step))
+        state = state + increment(ARRAYS, CLASSICAL, partial(slope, state, now), 0.0, step)
         now += step
     return now, np.array(rows)
 

@@ -20,7 +20,8 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star, dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector, matvec, plus, scaled
+from lie_codegen.kernel.linear import Matrix, Vector, matvec, plus
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 
 
 def driven_increments(
@@ -36,21 +37,15 @@ def driven_increments(
 ) -> tuple[Vector, Vector]:
     """Theta and the change of xi with X_next = X exp(Theta): one RKMK4 step of Theta' = dexpinv(xi), J xi' = ad*_xi J xi + f."""
 
-    def rates(theta: Vector, change: Vector, force: Vector) -> tuple[Vector, Vector]:
-        eta = plus(xi, change)
-        turning = ad_star(ops, group.algebra, eta, matvec(J, eta))
-        return dexp_inverse(ops, group.algebra, theta, eta), matvec(inverse, plus(turning, force))
+    n = group.dim
 
-    zero: Vector = [0] * group.dim
-    stages = [rates(zero, zero, f0)]
-    for part, force in ((0.5, fm), (0.5, fm), (1, f1)):
-        k, a = stages[-1]
-        stages.append(rates(scaled(part * h, k), scaled(part * h, a), force))
-    (k1, a1), (k2, a2), (k3, a3), (k4, a4) = stages
-    sixth, third = h / 6, h / 3
-    theta = plus(scaled(sixth, plus(k1, k4)), scaled(third, plus(k2, k3)))
-    change = plus(scaled(sixth, plus(a1, a4)), scaled(third, plus(a2, a3)))
-    return theta, change
+    def rate(c: float, moved: Vector) -> Vector:
+        theta, eta, force = moved[:n], plus(xi, moved[n:]), {0.0: f0, 0.5: fm, 1.0: f1}[c]
+        turning = ad_star(ops, group.algebra, eta, matvec(J, eta))
+        return [*dexp_inverse(ops, group.algebra, theta, eta), *matvec(inverse, plus(turning, force))]
+
+    total = increment(vectors(ops), CLASSICAL, rate, [0] * (2 * n), h)
+    return total[:n], total[n:]
 
 
 @kernel_factory(group=as_group)

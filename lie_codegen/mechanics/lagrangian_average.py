@@ -12,6 +12,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, plus, scaled
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 from lie_codegen.mechanics.bracket_series import BracketSeries, bracket_series, check_series
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.lagrangian_fields import Dynamics, Fields
@@ -151,14 +152,10 @@ def series_kernels(fields: LagrangianSeries, namespace: str) -> tuple[Kernel, ..
                 table[word] = table[word] + value if word in table else value
             power = power * small
 
-        def slope(change: Vector, part: float) -> Vector:
-            return at(ops, given, plus(state, scaled(part, change))).sum(table)
+        def slope(_: float, change: Vector) -> Vector:
+            return at(ops, given, plus(state, change)).sum(table)
 
-        k1 = slope([0] * n, 0)
-        k2 = slope(k1, 0.5)
-        k3 = slope(k2, 0.5)
-        k4 = slope(k3, 1)
-        return plus(state, scaled(1 / 6, plus(k1, scaled(2, plus(k2, k3)), k4)))
+        return plus(state, increment(vectors(ops), CLASSICAL, slope, [0] * n, 1))
 
     def estimate(ops: Arithmetic, given: Any, state: Vector, fast: Scalar, small: Scalar) -> Vector:
         return flown(ops, given, shifted(ops, given, state, fast, -1), fast, small, -1)

@@ -16,6 +16,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.runge_kutta import CLASSICAL, TUPLES, increment
 from lie_codegen.mechanics.effective_potential import EffectivePotential, effective_potential
 from lie_codegen.mechanics.mechanical_fields import GAUGES, MOST, MechanicalFields, fourier_of
 from lie_codegen.mechanics.mechanical_kernels import (
@@ -336,21 +337,16 @@ class MechanicalAverage(Value):
         frozen = [(f, first[..., None] * eps[..., None] ** q * self._at(f, when)) for q, f in enumerate(logarithms)]
         group, h = self.system.group, 1 / _FLOW_STEPS
 
-        def slope(Y: Array, eta: Array, theta: Array, change: Array) -> tuple[Array, Array]:
-            here = Y @ expm(group.hat(theta))
-            state = self._state(eta + change, here, {})
+        def slope(_: float, moved: tuple[Array, Array]) -> tuple[Array, Array]:
+            theta, change = moved
+            state = self._state(xi + change, X @ expm(group.hat(theta)), {})
             parts = [self._value(f, state, values) for f, values in frozen]
             total = sum(parts[1:], parts[0])
             alpha, beta = total[..., 0, :], total[..., 1, :]
             return dexp_inverse(group.algebra, theta, alpha), beta
 
         for _ in range(_FLOW_STEPS):
-            zero = np.zeros_like(xi)
-            k1 = slope(X, xi, zero, zero)
-            k2 = slope(X, xi, h / 2 * k1[0], h / 2 * k1[1])
-            k3 = slope(X, xi, h / 2 * k2[0], h / 2 * k2[1])
-            k4 = slope(X, xi, h * k3[0], h * k3[1])
-            theta, change = (h / 6 * (a + 2 * b + 2 * d + e) for a, b, d, e in zip(k1, k2, k3, k4, strict=True))
+            theta, change = increment(TUPLES, CLASSICAL, slope, (np.zeros_like(xi), np.zeros_like(xi)), h)
             X, xi = X @ expm(group.hat(theta)), xi + change
         return GroupState(X, xi)
 

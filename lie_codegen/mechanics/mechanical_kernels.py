@@ -16,6 +16,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, plus, scaled
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 from lie_codegen.kernel.structural_zeros import add, product
 from lie_codegen.mechanics.mechanical_fields import Fourier, MechanicalFields
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
@@ -158,26 +159,15 @@ def moved(ops: Arithmetic, system: MechanicalSystem, state: Sequence[Scalar], ra
     """One fourth-order step of X' = X hat(alpha), xi' = beta, Gamma' = -(rho(alpha) Gamma + r(alpha)): Munthe-Kaas for X."""
     group, n, size = system.group, system.dim, packed_size(system.group)
     X, s = unpack(group, state[:size]), list(state[size:])
-    half = ops.constant(0.5)
 
-    def slope(part: float, theta: Vector, change: Vector) -> tuple[Vector, Vector]:
-        here = plus(s, change)
+    def slope(part: float, change: Vector) -> Vector:
+        theta, here = change[:n], plus(s, change[n:])
         alpha, beta = rate(part, here)
         turned = dexp_inverse(ops, group.algebra, theta, alpha)
-        return turned, [*beta, *_advected_rate(ops, system, alpha, here[n:])]
+        return [*turned, *beta, *_advected_rate(ops, system, alpha, here[n:])]
 
-    nothing: Vector = [0] * len(s)
-    stages = [slope(0.0, [0] * n, nothing)]
-    for part, when in ((half, 0.5), (half, 0.5), (1, 1.0)):
-        k, a = stages[-1]
-        stages.append(slope(when, scaled(product(part, h), k), scaled(product(part, h), a)))
-    sixth = product(ops.constant(1 / 6), h)
-
-    def total(which: int) -> Vector:
-        (a, b, c, d) = (stage[which] for stage in stages)
-        return scaled(sixth, plus(a, scaled(2, plus(b, c)), d))
-
-    return [*pack(group, times_taylor_exp(group, ops, X, total(0), TAYLOR_DEGREE)), *plus(s, total(1))]
+    total = increment(vectors(ops), CLASSICAL, slope, [0] * (n + len(s)), h)
+    return [*pack(group, times_taylor_exp(group, ops, X, total[:n], TAYLOR_DEGREE)), *plus(s, total[n:])]
 
 
 def _advected_rate(ops: Arithmetic, system: MechanicalSystem, alpha: Vector, gamma: Vector) -> Vector:

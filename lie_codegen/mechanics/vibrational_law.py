@@ -9,6 +9,8 @@ import numpy as np
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.linear import plus
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
 from lie_codegen.mechanics.vibrational_fields import fast_time
 from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
@@ -61,17 +63,10 @@ def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int 
         given, h = parameters(ops, alpha), design.eps * fast
         tau = design.switch_phase + j * fast
 
-        def slope(at: Any, when: Scalar) -> Any:
-            return named["actual"].evaluate(ops, at, when, design.eps, *given)[0]
+        def slope(c: float, change: Any) -> Any:
+            return named["actual"].evaluate(ops, plus(y, change), tau + c * fast, design.eps, *given)[0]
 
-        def moved(direction: Any, length: float) -> list[Scalar]:
-            return [a + length * d for a, d in zip(y, direction, strict=True)]
-
-        k1 = slope(y, tau)
-        k2 = slope(moved(k1, h / 2), tau + fast / 2)
-        k3 = slope(moved(k2, h / 2), tau + fast / 2)
-        k4 = slope(moved(k3, h), tau + fast)
-        end = [a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(y, k1, k2, k3, k4, strict=True)]
+        end = plus(y, increment(vectors(ops), CLASSICAL, slope, [0] * n, h))
         last = ops.less(steps - 1.5, j)
         return ([*end, *alpha, ops.where(last, 0.0 * j, j + 1)],)
 

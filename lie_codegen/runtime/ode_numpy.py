@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.kernel.runge_kutta import ARRAYS, CLASSICAL, increment
 from lie_codegen.runtime import dop853
 
 _REACHED, _EVENT, _STUCK = 0, 1, 3
@@ -118,13 +120,14 @@ def _locate(f: Function, events: Function, which: int, at: tuple[float, Array, f
 
 def fixed(f: Function, states: Array, t0: float, h: float, parts: int) -> Array:
     """The classical method of order 4; fills the rows behind the first."""
+
+    def slope(t: float, y: Array, c: float, change: Array) -> Array:
+        return f(t + c * h, y + change)
+
     y = states[0]
     for s in range(len(states) - 1):
         for j in range(parts):
             t = t0 + (s * parts + j) * h
-            a = f(t, y)
-            b = f(t + h / 2, y + h / 2 * a)
-            c = f(t + h / 2, y + h / 2 * b)
-            y = y + h / 6 * (a + 2 * (b + c) + f(t + h, y + h * c))
+            y = y + increment(ARRAYS, CLASSICAL, functools.partial(slope, t, y), 0.0, h)
         states[s + 1] = y
     return states

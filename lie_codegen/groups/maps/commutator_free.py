@@ -9,6 +9,7 @@ from lie_codegen.groups.maps.rkmk import flow_step, times_taylor_exp
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.runge_kutta import COMMUTATOR_FREE, combined, vectors
 
 
 @kernel_factory(group=as_group)
@@ -23,10 +24,9 @@ def commutator_free_step(group: GroupLike, name: str = "commutator_free_step") -
     group = as_group(group, "commutator_free_step")
 
     def body(ops: Arithmetic, X: Any, u0: Any, um: Any, u1: Any, h: Any) -> tuple[Any, ...]:
-        three = list(zip(u0, um, u1, strict=True))
-        first = [h / 12 * (3 * a + 4 * m - b) for a, m, b in three]
-        second = [h / 12 * (3 * b + 4 * m - a) for a, m, b in three]
-        return (times_taylor_exp(group, ops, times_taylor_exp(group, ops, X, first), second),)
+        for weights in COMMUTATOR_FREE:
+            X = times_taylor_exp(group, ops, X, combined(vectors(ops), weights, (u0, um, u1), h))
+        return (X,)
 
     formula = "X_next = X exp(h (u0/4 + um/3 - u1/12)) exp(h (-u0/12 + um/3 + u1/4))"
     source = "Celledoni, Marthinsen and Owren, Future Gener. Comput. Syst. 19 (2003) 341, for u that depends on t alone"

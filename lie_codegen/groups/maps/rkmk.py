@@ -16,7 +16,8 @@ from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Body, Kernel, Port
-from lie_codegen.kernel.linear import matmul, scaled
+from lie_codegen.kernel.linear import Vector, matmul, plus
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 from lie_codegen.kernel.structural_zeros import is_zero, product
 
 #: Taylor terms of exp in a step: below 1e-17 relative for |h u| <= 1/4, which `simulate` keeps to.
@@ -32,12 +33,10 @@ def rkmk4_increment(
     Munthe-Kaas, BIT 38 (1998) 92.
     """
 
-    half = ops.constant(Fraction(1, 2))
-    k1 = list(u0)
-    k2 = dexp_inverse(ops, group.algebra, scaled(half * h, k1), um)
-    k3 = dexp_inverse(ops, group.algebra, scaled(half * h, k2), um)
-    k4 = dexp_inverse(ops, group.algebra, scaled(h, k3), u1)
-    return [h / 6 * (a + 2 * (b + c) + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+    def rate(c: float, theta: Vector) -> Vector:
+        return dexp_inverse(ops, group.algebra, theta, {0.0: u0, 0.5: um, 1.0: u1}[c])
+
+    return list(increment(vectors(ops), CLASSICAL, rate, [0] * group.dim, h))
 
 
 def times_taylor_exp(
@@ -136,15 +135,10 @@ def wei_norman_step(group: GroupLike, name: str = "wei_norman_step") -> Kernel:
     data = WeiNormanData(group)
 
     def body(ops: Arithmetic, g: Any, u0: Any, um: Any, u1: Any, h: Any) -> tuple[Any, ...]:
-        def moved(k: Sequence[Scalar], factor: Scalar) -> list[Scalar]:
-            return [a + factor * b for a, b in zip(g, k, strict=True)]
+        def slope(c: float, change: Vector) -> Vector:
+            return rate(ops, data, plus(g, change), {0.0: u0, 0.5: um, 1.0: u1}[c])
 
-        half, sixth = h * 0.5, h * (1 / 6)
-        k1 = rate(ops, data, g, u0)
-        k2 = rate(ops, data, moved(k1, half), um)
-        k3 = rate(ops, data, moved(k2, half), um)
-        k4 = rate(ops, data, moved(k3, h), u1)
-        return ([x + sixth * (a + 2 * (b + c) + e) for x, a, b, c, e in zip(g, k1, k2, k3, k4, strict=True)],)
+        return (plus(g, increment(vectors(ops), CLASSICAL, slope, [0] * n, h)),)
 
     return Kernel(
         name=name,

@@ -21,6 +21,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
 from lie_codegen.flow.second_kind_coordinates import second_kind
+from lie_codegen.kernel.runge_kutta import propagators
 from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
 from lie_codegen.steering.task import Task
@@ -135,20 +136,12 @@ def _coordinates(task: Task, first: int, chain: list[tuple[int, float]]) -> tupl
 
 
 def _flown(y: Array, u1: Any, u2: Any, phase: float) -> Array:
-    """The chain's coordinates after one phase, by Runge-Kutta steps; u1 and u2 are smooth there."""
-    h = phase / _STEPS
-
-    def rate(s: float, y: Array) -> Array:
-        moved = np.empty_like(y)
-        moved[0] = u2(s)
-        moved[1:] = -u1(s) * y[:-1]
-        return moved
-
-    for step in range(_STEPS):
-        s = step * h
-        k1 = rate(s, y)
-        k2 = rate(s + h / 2, y + h / 2 * k1)
-        k3 = rate(s + h / 2, y + h / 2 * k2)
-        k4 = rate(s + h, y + h * k3)
-        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return y
+    """The chain's coordinates after one phase, by Runge-Kutta steps; u1 and u2 of an array of times are smooth there."""
+    s, n = np.linspace(0.0, phase, 2 * _STEPS + 1), len(y)
+    A = np.zeros((len(s), n + 1, n + 1))  # of (y, 1)
+    A[:, 0, n] = u2(s)
+    A[:, range(1, n), range(n - 1)] = -np.reshape(u1(s), (-1, 1))
+    state = np.append(y, 1.0)
+    for step in propagators(A, phase / _STEPS):
+        state = step @ state
+    return state[:n]

@@ -8,6 +8,7 @@ from typing import Any
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.brackets import ad_star
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matvec, plus, scaled
+from lie_codegen.kernel.runge_kutta import CLASSICAL, EULER, MIDPOINT
 from lie_codegen.steering.ocp.layout import Layout
 from lie_codegen.steering.ocp.terms import Point, Scope, Term
 
@@ -19,12 +20,8 @@ QUADRATURES: dict[str, tuple[tuple[float, float], ...]] = {
     "trapezoid": ((0.0, 0.5), (1.0, 0.5)),
     "simpson": ((0.0, 1 / 6), (0.5, 4 / 6), (1.0, 1 / 6)),
 }
-#: Explicit tableaus in which each stage needs only the one before it: (a, b, c).
-INTEGRATORS: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]] = {
-    "rkmk4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6), (0.0, 0.5, 0.5, 1.0)),
-    "midpoint": ((0.0, 0.5), (0.0, 1.0), (0.0, 0.5)),
-    "exact": ((0.0,), (1.0,), (0.0,)),
-}
+#: Explicit tableaus in which each stage needs only the one before it.
+INTEGRATORS = {"rkmk4": CLASSICAL, "midpoint": MIDPOINT, "exact": EULER}
 
 
 @dataclass(frozen=True)
@@ -140,8 +137,10 @@ class ProblemData:
 
     @property
     def tableau(self) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-        """Of the integrator; of one stage where that is exact."""
-        return INTEGRATORS["exact" if self.is_invariant else self.integrator]
+        """(a, b, c) of the integrator, a_i the entry beside the diagonal; of one stage where that is exact."""
+        chosen = INTEGRATORS["exact" if self.is_invariant else self.integrator]
+        a = tuple(float(row[-1]) if row else 0.0 for row in chosen.a)
+        return a, tuple(float(w) for w in chosen.b), tuple(c for c, _ in chosen.stages)
 
     def xi(self, at: Point) -> Vector:
         """(n,) body velocity, by the time of the equations."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.runge_kutta import propagators
 from lie_codegen.steering.shooting.bracket_lengths import bracket_lengths
 
 _ORDER = 12
@@ -91,7 +92,7 @@ class Extremal:
         flow[:, :n, :n] += np.einsum("ijk,tk,il->tjl", self._ad, mu, select)
         flow[:, n:, :n] = np.eye(n)[:, list(self.controls)] @ select
         flow[:, n:, n:] = -np.einsum("ti,ikj->tjk", u, self._ad)
-        steps = _runge_kutta(flow, 1.0 / _STEPS)
+        steps = propagators(flow, 1.0 / _STEPS)
         state = np.vstack([np.eye(n), np.zeros((n, n))])
         xi = []
         for step in steps:
@@ -132,14 +133,3 @@ class Extremal:
     def singular_values(self) -> Array:
         """(n,) of vee(X^-1 dX(1) / d mu0), largest first; the last is 0 where the target is a conjugate point."""
         return np.asarray(np.linalg.svd(self.sensitivities[-1], compute_uv=False))
-
-
-def _runge_kutta(flow: Array, h: float) -> Array:
-    """Propagators of y' = A(t) y over each step, A given at its ends and its middle."""
-    start, middle, end = flow[:-1:2], flow[1::2], flow[2::2]
-    identity = np.eye(flow.shape[1])
-    k1 = start
-    k2 = middle @ (identity + h / 2 * k1)
-    k3 = middle @ (identity + h / 2 * k2)
-    k4 = end @ (identity + h * k3)
-    return np.asarray(identity + h / 6 * (k1 + 2 * (k2 + k3) + k4))

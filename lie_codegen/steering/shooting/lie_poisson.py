@@ -11,7 +11,6 @@ Everything is a polynomial, so that the same text runs on one double or on a vec
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from typing import Any
 
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
@@ -21,7 +20,8 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star, bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import dot, matmul, plus
+from lie_codegen.kernel.linear import matmul, plus
+from lie_codegen.kernel.runge_kutta import CLASSICAL, HALF_WAY, combined, increment, vectors
 from lie_codegen.kernel.structural_zeros import add
 from lie_codegen.steering.shooting.lie_poisson_ends import advance, correction, endpoint, offset
 
@@ -68,11 +68,14 @@ def costate_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     n, m = group.dim, len(controls)
 
     def body(ops: Arithmetic, u0: Any, u1: Any, u2: Any, mu: Any) -> tuple[Any, ...]:
-        u = (u0, u1, u2)
-        steps = _stages(ops, lambda y, half: _coadjoint(group, controls, ops, u[half], y), mu)
-        weights = [ops.constant(Fraction(k, 24)) for k in (5, 4, 4, -1)]
-        middle = [y + dot(weights, slopes) for y, *slopes in zip(mu, *steps, strict=True)]
-        return middle, _after(ops, mu, steps)
+        slopes: list[list[Scalar]] = []
+
+        def rate(c: float, y: Sequence[Scalar]) -> list[Scalar]:
+            slopes.append(_coadjoint(group, controls, ops, {0.0: u0, 0.5: u1, 1.0: u2}[c], y))
+            return slopes[-1]
+
+        after = _runge_kutta(ops, rate, mu)
+        return plus(mu, combined(vectors(ops), HALF_WAY, slopes, 1)), after
 
     return Kernel(
         "costate_step",
@@ -90,9 +93,8 @@ def path_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     size, m = packed_size(group), len(controls)
 
     def body(ops: Arithmetic, u0: Any, u1: Any, u2: Any, X: Any) -> tuple[Any, ...]:
-        u = (u0, u1, u2)
-        steps = _stages(ops, lambda Y, half: _moving(group, controls, ops, u[half], Y), X)
-        return (_after(ops, X, steps),)
+        u = {0.0: u0, 0.5: u1, 1.0: u2}
+        return (_runge_kutta(ops, lambda c, Y: _moving(group, controls, ops, u[c], Y), X),)
 
     return Kernel(
         "path_step",
@@ -135,7 +137,7 @@ def flow_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     n, size = group.dim, packed_size(group)
 
     def body(ops: Arithmetic, v: Any, mu: Any, X: Any) -> tuple[Any, ...]:
-        def rate(state: Sequence[Scalar], _: int) -> list[Scalar]:
+        def rate(_: float, state: Sequence[Scalar]) -> list[Scalar]:
             mu_rate, X_rate = _rates(group, controls, ops, v, state[:n], state[n:])
             return [*mu_rate, *X_rate]
 
@@ -162,10 +164,10 @@ def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
     n, m = group.dim, len(controls)
 
     def body(ops: Arithmetic, v: Any, mu0: Any, mu1: Any, mu2: Any, psi: Any, xi: Any) -> tuple[Any, ...]:
-        nodes = [(_velocity(controls, v, mu), mu) for mu in (mu0, mu1, mu2)]
+        nodes = {c: (_velocity(controls, v, mu), mu) for c, mu in ((0.0, mu0), (0.5, mu1), (1.0, mu2))}
 
-        def rate(state: Sequence[Scalar], half: int) -> list[Scalar]:
-            (u, mu), psi, xi = nodes[half], state[:n], state[n:]
+        def rate(c: float, state: Sequence[Scalar]) -> list[Scalar]:
+            (u, mu), psi, xi = nodes[c], state[:n], state[n:]
             du = _velocity(controls, v, psi)
             psi_rate = plus(_coadjoint(group, controls, ops, du, mu), _coadjoint(group, controls, ops, u, psi))
             xi_rate = bracket(ops, group.algebra, xi, _spread(group, controls, u))
@@ -187,28 +189,10 @@ def column_step(group: MatrixGroup, controls: tuple[int, ...]) -> Kernel:
 
 
 def _runge_kutta(
-    ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
+    ops: Arithmetic, rate: Callable[[float, list[Scalar]], list[Scalar]], y: Sequence[Scalar]
 ) -> list[Scalar]:
-    """y after one classical step; rate(y, k) is h f at the time k h / 2."""
-    return _after(ops, y, _stages(ops, rate, y))
-
-
-def _stages(
-    ops: Arithmetic, rate: Callable[[Sequence[Scalar], int], list[Scalar]], y: Sequence[Scalar]
-) -> tuple[list[Scalar], ...]:
-    half = ops.constant(Fraction(1, 2))
-    k1 = rate(y, 0)
-    k2 = rate([a + half * k for a, k in zip(y, k1, strict=True)], 1)
-    k3 = rate([a + half * k for a, k in zip(y, k2, strict=True)], 1)
-    return k1, k2, k3, rate(plus(y, k3), 2)
-
-
-def _after(ops: Arithmetic, y: Sequence[Scalar], stages: tuple[list[Scalar], ...]) -> list[Scalar]:
-    sixth = ops.constant(Fraction(1, 6))
-    return [
-        a + sixth * (add(first, last) + 2 * add(second, third))
-        for a, first, second, third, last in zip(y, *stages, strict=True)
-    ]
+    """y after one classical step; rate(c, y) is h f at the time c h."""
+    return plus(y, increment(vectors(ops), CLASSICAL, lambda c, change: rate(c, plus(y, change)), [0] * len(y), 1))
 
 
 def _rates(

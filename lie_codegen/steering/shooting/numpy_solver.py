@@ -12,6 +12,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.runge_kutta import CLASSICAL, TUPLES, increment, propagators
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.defaults import Defaults
 from lie_codegen.steering.shooting.extremals import Extremals
@@ -151,17 +152,13 @@ class NumpyShooting:
         state = (mu, start, psi, np.zeros((count, n, columns)))
         h = length / steps
 
-        def moved(rates: tuple[Array, ...], size: float) -> tuple[Array, ...]:
-            return tuple(value + size * rate for value, rate in zip(state, rates, strict=True))
+        space = TUPLES
+
+        def rate(_: float, change: tuple[Array, ...]) -> tuple[Array, ...]:
+            return self._rate(space.plus(state, change), weights)
 
         for _ in range(steps):
-            k1 = self._rate(state, weights)
-            k2 = self._rate(moved(k1, h / 2), weights)
-            k3 = self._rate(moved(k2, h / 2), weights)
-            k4 = self._rate(moved(k3, h), weights)
-            state = tuple(
-                y + h / 6 * (a + 2 * (b + c) + e) for y, a, b, c, e in zip(state, k1, k2, k3, k4, strict=True)
-            )
+            state = space.plus(state, increment(space, CLASSICAL, rate, (0.0,) * len(state), h))
         return state
 
     def _rate(self, state: tuple[Array, ...], weights: Array) -> tuple[Array, ...]:
@@ -183,16 +180,13 @@ class NumpyShooting:
         H, g = np.zeros((count, n, n)), np.zeros((count, n))
         h = 1.0 / _SEED_STEPS
         act = np.einsum("sti,ijk->tsjk", u, self._ad)
+        steps = propagators(act, h)
         for t in range(0, 2 * _SEED_STEPS + 1, 2):
             rows = psi[:, self._controls]
             g += np.einsum("sic,si->sc", rows, u[:, t])
             H += np.einsum("sic,sid,i->scd", rows, rows, 1 / weights)
             if t < 2 * _SEED_STEPS:
-                k1 = act[t] @ psi
-                k2 = act[t + 1] @ (psi + h / 2 * k1)
-                k3 = act[t + 1] @ (psi + h / 2 * k2)
-                k4 = act[t + 2] @ (psi + h * k3)
-                psi = psi + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+                psi = steps[t // 2] @ psi
         shift = 1e-4 * np.trace(H, axis1=1, axis2=2) / n
         return np.asarray(np.linalg.solve(H + shift[:, None, None] * np.eye(n), g[..., None])[..., 0])
 

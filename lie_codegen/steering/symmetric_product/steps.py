@@ -16,6 +16,7 @@ from lie_codegen.kernel.brackets import ad_star, dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec, plus, scaled, transpose
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.library import Library
 
@@ -65,22 +66,15 @@ def oscillation_step(group: MatrixGroup, forces: int) -> Kernel:
         at_stages = {part: inputs(x + part * h) for part in (0.0, 0.5, 1.0)}
         step = h * T
 
-        def slope(part: float, theta: Vector, change: Vector) -> tuple[Vector, Vector]:
+        def slope(part: float, moved: Vector) -> Vector:
             v, U = at_stages[part]
+            theta, change = moved[:n], moved[n:]
             xi = plus(w, change, U)
             force = plus(ad_star(ops, group.algebra, xi, matvec(J, xi)), scaled(-1, matvec(D, xi)))
-            return dexp_inverse(ops, group.algebra, theta, xi), plus(matvec(inverse, force), v)
+            return [*dexp_inverse(ops, group.algebra, theta, xi), *plus(matvec(inverse, force), v)]
 
-        stages = [slope(0.0, [0] * n, [0] * n)]
-        for part in (0.5, 0.5, 1.0):
-            k, a = stages[-1]
-            stages.append(slope(part, scaled(part * step, k), scaled(part * step, a)))
-
-        def total(which: int) -> Vector:
-            k1, k2, k3, k4 = (stage[which] for stage in stages)
-            return scaled(step / 6, plus(k1, scaled(2, plus(k2, k3)), k4))
-
-        return ([*pack(group, times_taylor_exp(group, ops, X, total(0), TAYLOR_DEGREE)), *plus(w, total(1))],)
+        total = increment(vectors(ops), CLASSICAL, slope, [0] * (2 * n), step)
+        return ([*pack(group, times_taylor_exp(group, ops, X, total[:n], TAYLOR_DEGREE)), *plus(w, total[n:])],)
 
     data = WeiNormanData(group)
     square = (n, n)

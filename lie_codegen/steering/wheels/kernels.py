@@ -13,8 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
+from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
@@ -22,9 +24,11 @@ from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, cross, matvec, minus, plus, scaled, transpose
+from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
 from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.on_demand import sympy as sp
@@ -64,30 +68,27 @@ class Body:
         """O_i = h_i / j_i - b_i . w."""
         return [h / j - x for h, j, x in zip(momenta, self.axial, matvec(self.axes, rate), strict=True)]
 
-    def moved(self, X: Any, carried: Vector, h: Scalar, rate_at: Callable[[Vector, int], Vector]) -> tuple[Any, Vector]:
-        """X after a step, and theta: rate_at(G, stage) is w in body axes at stages 0 (t), 1 (t + h/2), 2 (t + h)."""
-        ops, half = self.ops, self.ops.constant(Fraction(1, 2))
+    def moved(self, X: Any, carried: Vector, h: Scalar, rate_at: Callable[[Vector, float], Vector]) -> Any:
+        """X after a step: rate_at(G, c) is w in body axes at t + c h, c = 0, 1/2, 1."""
+        ops = self.ops
 
-        def slope(theta: Vector, stage: int) -> Vector:
-            w = rate_at(turned(ops, theta, carried), stage)
-            if not theta:
-                return w
-            first = cross(theta, w)  # theta' = w + [theta, w]/2 + [theta, [theta, w]]/12, body axes
-            second = cross(theta, first)
-            return [v + half * a + ops.constant(Fraction(1, 12)) * b for v, a, b in zip(w, first, second, strict=True)]
+        def slope(c: float, theta: Vector) -> Vector:
+            return dexp_inverse(ops, _turning(), theta, rate_at(turned(ops, theta, carried), c))
 
-        k1 = slope([], 0)
-        k2 = slope(scaled(half * h, k1), 1)
-        k3 = slope(scaled(half * h, k2), 1)
-        k4 = slope(scaled(h, k3), 2)
-        theta = [h / 6 * (a + 2 * (b + c) + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-        return times_taylor_exp(self.group, ops, X, matvec(self.to_basis, theta)), theta
+        theta = increment(vectors(ops), CLASSICAL, slope, [0, 0, 0], h)
+        return times_taylor_exp(self.group, ops, X, matvec(self.to_basis, theta))
+
+
+@lru_cache(maxsize=1)
+def _turning() -> LieAlgebra:
+    """[a, b] = a x b: angular velocities in body axes."""
+    return LieAlgebra("cross", ("x", "y", "z"), {(0, 1): {2: 1}, (0, 2): {1: -1}, (1, 2): {0: 1}})
 
 
 def turned(ops: Arithmetic, theta: Vector, G: Vector) -> Vector:
     """exp(-hat theta) G by its Taylor polynomial."""
     value, term = list(G), list(G)
-    for order in range(1, _STAGE_TERMS + 1) if theta else ():
+    for order in range(1, _STAGE_TERMS + 1):
         term = scaled(ops.constant(Fraction(1, order)), cross(term, theta))  # -theta x term
         value = plus(value, term)
     return value
@@ -120,10 +121,11 @@ def wheel_speed_step(group: GroupLike, frame: Any, inertia: Any, axes: Any, axia
     def body(ops: Arithmetic, X: Any, stored: Vector, s0: Vector, sm: Vector, s1: Vector, h: Scalar) -> tuple[Any, ...]:
         numbers = Body(ops, group, sp.Matrix(frame), wheels)
 
-        def rate_at(G: Vector, stage: int) -> Vector:
-            return matvec(numbers.locked_inverse, minus(G, matvec(numbers.momenta, (s0, sm, s1)[stage])))
+        def rate_at(G: Vector, c: float) -> Vector:
+            speeds = {0.0: s0, 0.5: sm, 1.0: s1}[c]
+            return matvec(numbers.locked_inverse, minus(G, matvec(numbers.momenta, speeds)))
 
-        return (numbers.moved(X, numbers.carried(X, stored), h, rate_at)[0],)
+        return (numbers.moved(X, numbers.carried(X, stored), h, rate_at),)
 
     return Kernel(
         name="wheel_speed_step",
@@ -187,11 +189,10 @@ def torque_step(
     ]
     end = [m + h / 6 * (a + 4 * b + c) for m, a, b, c in zip(momenta, first, middle, last, strict=True)]
 
-    def rate_at(G: Vector, stage: int) -> Vector:
-        return numbers.rate(G, (momenta, half, end)[stage])
+    def rate_at(G: Vector, c: float) -> Vector:
+        return numbers.rate(G, {0.0: momenta, 0.5: half, 1.0: end}[c])
 
-    X_next, _ = numbers.moved(X, numbers.carried(X, stored), h, rate_at)
-    return [*pack(numbers.group, X_next), *end]
+    return [*pack(numbers.group, numbers.moved(X, numbers.carried(X, stored), h, rate_at)), *end]
 
 
 @kernel_factory(group=as_group)
