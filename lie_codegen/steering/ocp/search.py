@@ -94,13 +94,14 @@ class Search:
             return spaces
         # compiled code hears no signal: it runs beside the thread that does, which tells it to stop
         with ThreadPoolExecutor(max(1, min(lanes, len(spaces)))) as pool:
-            waiting = [pool.submit(run, space) for space in spaces]
             try:
-                for each in waiting:
+                # handing out thousands of starts takes a while too: the key may be pressed in the midst of it
+                for each in [pool.submit(run, space) for space in spaces]:
                     each.result()
             except BaseException:
                 for space in spaces:
                     space["stop"] = 1
+                pool.shutdown(wait=False, cancel_futures=True)
                 raise
         return spaces
 
