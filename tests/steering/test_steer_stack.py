@@ -14,7 +14,7 @@ import lie_codegen as lc
 from lie_codegen.algebra.controllability import require_controllable
 from lie_codegen.steering.shooting.package import render_steering_package
 from lie_codegen.steering.shooting.source import steering_view
-from lie_codegen.steering.shooting.stack import LANES, stack_bytes, workspace_bytes
+from lie_codegen.steering.shooting.stack import LANES, LIBRARY, stack_bytes, workspace_bytes
 from lie_codegen.steering.shooting.views import SteeringView
 
 COMPILER = shutil.which("gcc")
@@ -131,7 +131,8 @@ def test_what_gcc_says_is_below(
     graph = (tmp_path / "x.ci").read_text()
     for entry, own in (("solve", False), ("solve_in", True)):
         found, said = deepest(graph, f"{name}_steer_{entry}"), stated(name, controls, lanes, own=own)
-        assert 0.25 * said < found <= said, entry
+        # gcc does not see libm, for which the bound has a place too
+        assert 0.25 * (said - LIBRARY) < found <= said, entry
 
 
 @pytest.mark.parametrize(("name", "controls", "lanes"), WIDTHS)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 #: As in steering_core.c: lanes where the compiler has vectors, Runge-Kutta steps and candidates kept, rows of the extrapolation.
 LANES, _NODES, _KEPT, _ROWS = 8, 129, 8, 8
 #: Registers saved, arguments passed on the stack, alignment of vectors: of a frame, twelve frames deep; libm.
-_FRAMES, _LIBRARY = 12 * 320, 2048
+_FRAMES, LIBRARY = 12 * 320, 2048
 
 
 def workspace_bytes(view: SteeringView, lanes: int) -> int:
@@ -42,7 +42,7 @@ def stack_bytes(view: SteeringView, lanes: int, *, in_workspace: bool = False) -
     integrate = (_ROWS + 2) * (n + size) + m + 1 + kernel
     vectors = solve + search + max(relax, descend + linearise + max(tangent, integrate))
     # a kernel's constants are spread over the lanes in temporaries of their own
-    small = 8 * lanes * vectors * 3 // 2 + _FRAMES + _LIBRARY
+    small = 8 * lanes * vectors * 3 // 2 + _FRAMES + LIBRARY
     return _round_up(small if in_workspace else small + workspace_bytes(view, lanes))
 
 
