@@ -26,12 +26,12 @@ from lie_codegen.control.error_inputs import input_parameters
 from lie_codegen.control.physical_inertia import kept_physical
 from lie_codegen.control.reference_kernels import ReferenceBody
 from lie_codegen.control.reference_motion import Reference
-from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force
+from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number, symmetric_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.guard import nan_off_group
-from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
+from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData
@@ -176,16 +176,11 @@ def adaptive_law(
         X, X_d = random_element(group, data, rng), random_element(group, data, rng)
         return X, vectors[0], X_d, vectors[1], vectors[2], [float(x) for x in a0], *sample_inputs(parameters, rng)
 
-    speed = velocity_units(group)
     made = AdaptiveLaw(
         name=name,
         namespace=group.name,
         inputs=(
-            matrix_port(group, "X", "configuration, body to inertial"),
-            Port("xi", (n,), speed, description="body velocity"),
-            matrix_port(group, "X_d", "reference configuration"),
-            Port("xi_d", (n,), speed, description="reference velocity"),
-            Port("xi_d_dot", (n,), velocity_units(group, "s^2"), description="its rate of change"),
+            *motion_ports(group),
             Port("a", (m,), description="parameters of the inertia, a state of the law"),
             *input_ports(parameters),
         ),

@@ -25,14 +25,13 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.attitude_law import _rotation
-from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force
+from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.guard import nan_off_group
-from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -214,16 +213,11 @@ def hybrid_law(
             *sample_inputs(parameters, rng),
         )
 
-    speed = velocity_units(group)
     made = HybridLaw(
         name=name,
         namespace=group.name,
         inputs=(
-            matrix_port(group, "X", "configuration, body to inertial"),
-            Port("xi", (3,), speed, description="body velocity"),
-            matrix_port(group, "X_d", "reference configuration"),
-            Port("xi_d", (3,), speed, description="reference velocity"),
-            Port("xi_d_dot", (3,), velocity_units(group, "s^2"), description="its rate of change"),
+            *motion_ports(group),
             Port("q", (), description="which of the two functions: 1 or -1, held between calls"),
             *input_ports(parameters),
         ),

@@ -14,12 +14,11 @@ import random
 from typing import Any
 
 from lie_codegen.control.attitude_law import _rotation
-from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force
+from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.guard import nan_off_group
-from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
 from lie_codegen.groups.maps.rotation_log import quaternion_of
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
@@ -98,16 +97,11 @@ def quaternion_law(
         last = [rng.uniform(-1, 1) for _ in range(4)]
         return _rotation(rng), vectors[0], _rotation(rng), *vectors[1:], last, *sample_inputs(parameters, rng)
 
-    speed = velocity_units(group)
     made = Kernel(
         name=name,
         namespace=group.name,
         inputs=(
-            matrix_port(group, "X", "configuration, body to inertial"),
-            Port("xi", (3,), speed, description="body velocity"),
-            matrix_port(group, "X_d", "reference configuration"),
-            Port("xi_d", (3,), speed, description="reference velocity"),
-            Port("xi_d_dot", (3,), velocity_units(group, "s^2"), description="its rate of change"),
+            *motion_ports(group),
             Port("q", (4,), description="quaternion of the error at the last call, scalar first; 0: none"),
             *input_ports(parameters),
         ),

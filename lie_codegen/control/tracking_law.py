@@ -174,6 +174,18 @@ def _law(
     return force, phi, energy, -dot(damping, xi_e)
 
 
+def motion_ports(group: MatrixGroup) -> tuple[Port, ...]:
+    """(X, xi, X_d, xi_d, xi_d_dot): what a law with a memory of its own reads of the motion and of its reference."""
+    n, speed = group.dim, velocity_units(group)
+    return (
+        matrix_port(group, "X", "configuration, body to inertial"),
+        Port("xi", (n,), speed, description="body velocity"),
+        matrix_port(group, "X_d", "reference configuration"),
+        Port("xi_d", (n,), speed, description="reference velocity"),
+        Port("xi_d_dot", (n,), velocity_units(group, "s^2"), description="its rate of change"),
+    )
+
+
 def feedforward_force(
     ops: Arithmetic,
     real: RealMatrices,

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,43 +48,65 @@ _ROUNDING = {ROUNDOFF["double"]: 1e-13, ROUNDOFF["float"]: 4e-6}
 _STEPS = 3
 _RESIDUAL, _DISTANCE = 1e-12, 1e-5
 _SETTLED = 4e-15
-#: What counts as zero on the way, in double and in single precision: `off`, `pivot`, `symmetric`, `kernel` bound squares.
-_DOUBLE = {
-    "off": "1e-30",
-    "pivot": "1e-36",
-    "symmetric": "1e-32",
-    "nudge": "1e-16",
-    "polar": "1e-15",
-    "deflation": "1.1e-16",
-    "singular": "1e-13",
-    "settled": repr(_SETTLED),
-    "residual": repr(_RESIDUAL),
-    "kernel": "1e-14",
-    "cluster": "1e-6",
-    "tie": "1e-9",
-    "short": "1e-7",
-    "independent": "1e-6",
-    "turn": "1e-5",
-    "cost": "1e-6",
-}
-_SINGLE = {
-    "off": "1e-13",
-    "pivot": "1e-18",
-    "symmetric": "1e-14",
-    "nudge": "1e-7",
-    "polar": "5e-7",
-    "deflation": "6e-8",
-    "singular": "1e-5",
-    "settled": "1e-6",
-    "residual": "2e-5",
-    "kernel": "1e-5",
-    "cluster": "3e-4",
-    "tie": "1e-4",
-    "short": "1e-3",
-    "independent": "3e-4",
-    "turn": "1e-3",
-    "cost": "1e-4",
-}
+
+
+class _Rounding(NamedTuple):
+    """What counts as zero on the way, as C constants: `off`, `pivot`, `symmetric`, `kernel` bound squares."""
+
+    off: str
+    pivot: str
+    symmetric: str
+    nudge: str
+    polar: str
+    deflation: str
+    singular: str
+    settled: str
+    residual: str
+    kernel: str
+    cluster: str
+    tie: str
+    short: str
+    independent: str
+    turn: str
+    cost: str
+
+
+_DOUBLE = _Rounding(
+    off="1e-30",
+    pivot="1e-36",
+    symmetric="1e-32",
+    nudge="1e-16",
+    polar="1e-15",
+    deflation="1.1e-16",
+    singular="1e-13",
+    settled=repr(_SETTLED),
+    residual=repr(_RESIDUAL),
+    kernel="1e-14",
+    cluster="1e-6",
+    tie="1e-9",
+    short="1e-7",
+    independent="1e-6",
+    turn="1e-5",
+    cost="1e-6",
+)
+_SINGLE = _Rounding(
+    off="1e-13",
+    pivot="1e-18",
+    symmetric="1e-14",
+    nudge="1e-7",
+    polar="5e-7",
+    deflation="6e-8",
+    singular="1e-5",
+    settled="1e-6",
+    residual="2e-5",
+    kernel="1e-5",
+    cluster="3e-4",
+    tie="1e-4",
+    short="1e-3",
+    independent="3e-4",
+    turn="1e-3",
+    cost="1e-4",
+)
 
 
 def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector:
@@ -172,7 +194,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         ("blocks", _Frozen(blocks)),
         ("logs_size", size),
         ("distance", distance),
-        ("rounding", _Settings(_DOUBLE)),
+        ("rounding", _DOUBLE),
         ("constants", tuple((i, j, k, float(c)) for i, j, k, c in group.algebra.constants())),
         ("candidate_symbol", first.symbol),
         ("error_symbol", second.symbol),
@@ -190,7 +212,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         twin,
         _tangent(data),
         # Rounding X to floats moves it off the group by a few 1e-7.
-        (("rounding", _Settings(_SINGLE)), ("distance", max(distance, 2e-5))),
+        (("rounding", _SINGLE), ("distance", max(distance, 2e-5))),
     )
 
 
@@ -228,13 +250,6 @@ class _Frozen(tuple[Any, ...]):
 
     def __hash__(self) -> int:
         return hash(repr(tuple(self)))
-
-
-class _Settings(dict[str, str]):
-    """Named constants that can be a part of a key."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(tuple(self.items()))
 
 
 def vee(ops: Arithmetic, data: GroupDerivation, A: Sequence[Sequence[Any]]) -> Vector:
