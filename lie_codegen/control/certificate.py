@@ -33,8 +33,8 @@ from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.definition import made_from
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.plain_data import made_from
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import scipy
 

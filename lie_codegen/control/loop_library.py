@@ -17,8 +17,9 @@ from lie_codegen.control.loop_rate import has_rate, loop_rate, loop_settle
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.identifiers import shown
-from lie_codegen.kernel.definition import Definition, NoDefinitionError, made_from, plain
+from lie_codegen.kernel.definition import plain
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.plain_data import Definition, NoDefinitionError, made_from
 from lie_codegen.runtime.build import build_kernels, defined_together
 from lie_codegen.runtime.library import Library
 

@@ -27,9 +27,9 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic
-from lie_codegen.kernel.definition import Definition, made_from
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec, number
+from lie_codegen.kernel.plain_data import Definition, made_from
 from lie_codegen.on_demand import sympy as sp
 
 CONFIGURATION, VELOCITY = ("X", "q"), ("xi", "omega", "q_dot")

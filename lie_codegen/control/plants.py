@@ -31,10 +31,11 @@ from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.definition import NoDefinitionError, plain, record_factory
+from lie_codegen.kernel.definition import plain, record_factory
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, dot
 from lie_codegen.kernel.parameter import INPUT, Parameter, parameter
+from lie_codegen.kernel.plain_data import NoDefinitionError
 from lie_codegen.mechanics.kernels import acceleration
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.records import find_record, store_record

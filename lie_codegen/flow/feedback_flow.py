@@ -26,9 +26,10 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.groups.wei_norman.body import rate as wei_norman_rate
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
-from lie_codegen.kernel.definition import Definition, NoDefinitionError, kernel_factory, made_from, plain
+from lie_codegen.kernel.definition import kernel_factory, plain
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, scaled
+from lie_codegen.kernel.plain_data import Definition, NoDefinitionError, made_from
 from lie_codegen.runtime import ode_numpy
 from lie_codegen.runtime.build import build_kernels, defined_together
 from lie_codegen.runtime.library import Library

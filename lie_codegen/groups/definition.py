@@ -14,7 +14,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.recorded import recorded
 from lie_codegen.groups.representation import faithful_representation
 from lie_codegen.identifiers import check_identifier, shown
-from lie_codegen.kernel.definition import makes_records
+from lie_codegen.kernel.plain_data import makes_records
 from lie_codegen.on_demand import sympy as sp
 
 

@@ -18,8 +18,9 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.kernel.casadi_functions import CasadiFunctions
-from lie_codegen.kernel.definition import Definition, definition_of
+from lie_codegen.kernel.definition import definition_of
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.on_demand import sympy as sp
 
 #: Where the kernels of a group are made, above this file: named here and loaded when `group.casadi` is asked.

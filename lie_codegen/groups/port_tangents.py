@@ -18,10 +18,10 @@ from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
-from lie_codegen.kernel.definition import made_from
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import number, total
+from lie_codegen.kernel.plain_data import made_from
 from lie_codegen.kernel.structural_zeros import is_zero, product
 
 #: A tangent of a port: for each of its entries, in C order, direction -> rate.

@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import functools
 import inspect
-import json
 import re
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
 from decimal import Decimal
 from fractions import Fraction
 from importlib import import_module
-from typing import Any, NoReturn, TypeVar, cast
+from typing import Any, cast
 
 import numpy as np
 
-from lie_codegen.errors import InputError
+from lie_codegen.kernel.plain_data import Definition, Factory, NoDefinitionError, makes_records
+from lie_codegen.kernel.records import RECORD, record_definition
 
 #: The kind of a group, and the length from which a fraction is shown with its decimal.
 _GROUP, _LONG = "lie_codegen.groups.definition:defined_group", 8
@@ -31,39 +32,8 @@ _GROUP, _LONG = "lie_codegen.groups.definition:defined_group", 8
 RECORDED = "lie_codegen.runtime.recorded_kernels"
 #: An exponent that no number of a law or a body has: a fraction of such a text fills the memory.
 _HUGE = re.compile(r"[eE][+-]?[0-9_]{4,}\s*$")
-Factory = TypeVar("Factory", bound=Callable[..., Any])
 #: Units of the numbers by parameter, or what tells them from the parameters.
 Units = Mapping[str, str] | Callable[[Mapping[str, Any]], Mapping[str, str]]
-
-
-class NoDefinitionError(TypeError):
-    """A value that is no plain data and has no definition, as a function written by the user."""
-
-
-class Definition(dict[str, Any]):
-    """A mapping of plain data that cannot be changed, and therefore has a hash."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(self.text)
-
-    @functools.cached_property
-    def text(self) -> str:
-        """Canonical JSON: equal definitions have equal texts."""
-        return json.dumps(self, sort_keys=True, separators=(",", ":"))
-
-    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
-        raise TypeError("a definition cannot be changed; make another thing")
-
-    __setitem__ = __delitem__ = update = setdefault = pop = popitem = clear = __ior__ = _refuse
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Definition, (dict(self),)
-
-    def __copy__(self) -> Definition:
-        return self
-
-    def __deepcopy__(self, _: Any) -> Definition:
-        return self
 
 
 def plain(value: Any) -> Any:
@@ -89,11 +59,15 @@ def plain(value: Any) -> Any:
         return f"{plain(value.real)} + I*({plain(value.imag)})"
     if isinstance(value, list | tuple):
         return tuple(plain(each) for each in value)
+    if isinstance(value, Definition):
+        return value
     if isinstance(value, Mapping):
         return Definition({str(key): plain(each) for key, each in value.items()})
     own = getattr(value, "definition", None)
     if isinstance(own, Definition):
         return own
+    if is_dataclass(value) and not isinstance(value, type) and type(value).__module__.startswith("lie_codegen."):
+        return record_definition(value)
     return _symbolic(value)
 
 
@@ -144,11 +118,37 @@ def described(definition: Definition | None) -> tuple[str, ...]:
         if value is None or key in ("name", "namespace") or _is_record(value, _GROUP):
             continue
         if _is_record(value):
-            inner = "; ".join(described(value))
-            lines.append(f"{key}: {value['kind'].partition(':')[2]}" + (f" with {inner}" if inner else ""))
+            own = value["parameters"]["record"] if value["kind"] == RECORD else None
+            inner = "; ".join(_fields(own["fields"]) if own else described(value))
+            made = (own["record"] if own else value["kind"]).partition(":")[2]
+            lines.append(f"{key}: {made}" + (f" with {inner}" if inner else ""))
         else:
             lines.append(f"{key} = {_shown(value)}" + (f" [{units[key]}]" if key in units else ""))
     return tuple(lines)
+
+
+def _fields(fields: Mapping[str, Any]) -> list[str]:
+    """Those of a record that are numbers, texts, formulas, or tuples of these, in words."""
+    shown = ((name, _entry(value)) for name, value in fields.items())
+    return [f"{name} = {text}" for name, text in shown if text is not None]
+
+
+def _entry(value: Any) -> str | None:
+    """A field of a record in words; None where it is not given or holds another record."""
+    if isinstance(value, Mapping):
+        if "formula" in value:
+            return str(value["formula"])
+        if "float" in value:
+            return repr(float.fromhex(value["float"]))
+        if "array" in value:
+            numbers = [float.fromhex(each) if isinstance(each, str) else each for each in value["array"]["entries"]]
+            return f"({', '.join(map(repr, numbers))})"
+        rows = value.get("tuple", value.get("list", value.get("matrix")))
+        return None if rows is None else _entry(tuple(rows))
+    if isinstance(value, tuple):
+        entries = [_entry(each) for each in value]
+        return f"({', '.join(map(str, entries))})" if entries and None not in entries else None
+    return None if value is None else str(value)
 
 
 def _is_record(value: Any, kind: str | None = None) -> bool:
@@ -166,35 +166,6 @@ def _shown(value: Any) -> str:
     return text
 
 
-def made_from(definition: Any) -> Any:
-    """What a definition defines; plain data stays what it is.
-
-    Raises:
-        InputError: the kind is not that of a factory.
-    """
-    if isinstance(definition, list | tuple):
-        return tuple(made_from(each) for each in definition)
-    if not isinstance(definition, Mapping):
-        return definition
-    if not {"kind", "parameters"} <= definition.keys() <= {"kind", "parameters", "units", "member"}:
-        return {key: made_from(each) for key, each in definition.items()}
-    made = _factory(definition["kind"])(**{key: made_from(each) for key, each in definition["parameters"].items()})
-    if "member" not in definition:
-        return made
-    return next(kernel for kernel in made if kernel.name == definition["member"])
-
-
-def _factory(kind: str) -> Callable[..., Any]:
-    module, _, name = str(kind).partition(":")
-    try:
-        function = getattr(import_module(module), name)
-    except (ImportError, AttributeError, ValueError):
-        raise InputError(f"nothing makes {kind!r}: was it moved or is its module not installed?") from None
-    if not getattr(function, "__makes_defined__", False):
-        raise InputError(f"{kind!r} is no factory of kernels or records (@kernel_factory)")
-    return cast(Callable[..., Any], function)
-
-
 def kernel_factory(*, units: Units | None = None, **reads: Callable[[Any], Any]) -> Callable[[Factory], Factory]:
     """Decorates a function that makes a Kernel, or several, from arguments: they get their definition.
 
@@ -208,6 +179,8 @@ def kernel_factory(*, units: Units | None = None, **reads: Callable[[Any], Any])
 
     def define(function: Callable[[], Any], definition: Definition) -> Any:
         made = import_module(RECORDED).recorded_kernel(definition, function)
+        if made is None:
+            return None  # a factory may have nothing to make, as where no closed form is known
         if not isinstance(made, tuple):
             return made.defined_by(definition)
         members = [Definition({**definition, "member": each.name}) for each in made]
@@ -229,12 +202,6 @@ def record_factory(**reads: Callable[[Any], Any]) -> Callable[[Factory], Factory
         return made
 
     return _factory_of(define, None, reads)
-
-
-def makes_records(function: Factory) -> Factory:
-    """Decorates a function that `made_from` may call, for records that say their definition themselves."""
-    function.__makes_defined__ = True  # type: ignore[attr-defined]
-    return function
 
 
 def _factory_of(
@@ -263,6 +230,11 @@ def _factory_of(
         return cast(Factory, makes_records(make))
 
     return decorate
+
+
+def double(value: Any) -> float:
+    """A number, or the text that stands for it in a definition, as a double."""
+    return float(Fraction(value))
 
 
 def doubles(value: Any) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic
-from lie_codegen.kernel.definition import Definition, made_from
+from lie_codegen.kernel.plain_data import Definition, made_from
 
 #: body(ops, *inputs) -> outputs; vectors are lists, matrices lists of rows, scalars plain scalars.
 Body = Callable[..., tuple[Any, ...]]

@@ -14,8 +14,8 @@ from importlib import import_module
 from typing import Any
 
 from lie_codegen.door import warnings_given
-from lie_codegen.kernel.definition import Definition
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.runtime.records import find_record, store_record
 
 _OWN = {field.name for field in fields(Kernel)}

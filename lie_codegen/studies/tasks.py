@@ -19,8 +19,9 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, LieCodegenError, ShapeError
-from lie_codegen.kernel.definition import NoDefinitionError, plain
+from lie_codegen.kernel.definition import plain
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.plain_data import NoDefinitionError
 from lie_codegen.studies.batched import batched_call, replayed_call
 from lie_codegen.studies.draws import noise_seed
 from lie_codegen.studies.results import Of, Single

@@ -23,7 +23,8 @@ from lie_codegen.control.integral_law import with_limits
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.second_order_step import held_force_step, second_order_step
 from lie_codegen.kernel.arithmetic import FloatArithmetic
-from lie_codegen.kernel.definition import Definition, doubles, made_from, plain
+from lie_codegen.kernel.definition import doubles, plain
+from lie_codegen.kernel.plain_data import Definition, made_from
 from lie_codegen.mechanics.variational_step import variational_step
 from lie_codegen.vehicles.quadrotor import flat_reference, quadrotor_law
 from lie_codegen.vehicles.sphere import sphere_law
