@@ -11,7 +11,7 @@ import typer
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit, progress
 from lie_codegen.cli.steering import steer
-from lie_codegen.errors import InputError, write_refusal
+from lie_codegen.errors import ComputationError, InputError, write_refusal
 
 _Optional = typer.Option
 _MOST_SAMPLES = 10_000_000
@@ -76,31 +76,50 @@ def reproduce(
     formats: Annotated[
         str, _Optional("--format", help="Formats beside the PNG, by commas: svg, pdf.", metavar="FORMATS")
     ] = "png",
+    themes: Annotated[
+        str, _Optional("--theme", help="Pages they are drawn for, by commas: light, dark.", metavar="THEMES")
+    ] = "light",
     json: Json = False,
 ) -> None:
     """Reproduce a figure of the papers: one picture, one JSON of numbers."""
     from lie_codegen.gallery.registry import TARGETS
     from lie_codegen.gallery.registry import reproduce as run_target
+    from lie_codegen.pictures.result import file_ending
 
     if figure == "list":
         names = {each.name: each.about for each in TARGETS}
         emit("\n".join(f"{name:24} {about}" for name, about in names.items()), {"figures": names}, json)
         return
-    kinds = list(dict.fromkeys(["png", *(each.strip().lower() for each in formats.split(","))]))
-    done = []
+    kinds = list(dict.fromkeys(["png", *_words(formats)]))
+    shades = _words(themes)
+    endings = list(dict.fromkeys([".png", *(file_ending(kind, shade) for shade in shades for kind in kinds)]))
+    done, failed = [], {}
     for name in [each.name for each in TARGETS] if figure == "all" else [figure]:
-        with progress(f"reproduce {name}") as report:
-            done.append(run_target(name, out, report, kinds))
-    pictures = {each.name: [each.picture.with_suffix(f".{kind}").resolve() for kind in kinds] for each in done}
+        try:
+            with progress(f"reproduce {name}") as report:
+                done.append(run_target(name, out, report, kinds, shades))
+        except ComputationError as error:
+            if figure != "all":
+                raise
+            failed[name] = str(error)  # the others are made all the same
+    files = {each.name: [out.resolve() / f"{each.name}{ending}" for ending in endings] for each in done}
     if figure == "all":
-        text = "\n".join(f"{name:28} {path}" for name, paths in pictures.items() for path in paths)
-        emit(text, {"pictures": {name: paths[0] for name, paths in pictures.items()}, "files": pictures}, json)
+        text = "\n".join(f"{name:28} {path}" for name, paths in files.items() for path in paths)
+        emit(text, {"pictures": {name: paths[0] for name, paths in files.items()}, "files": files}, json)
+        if failed:
+            told = "; ".join(f"{name}: {why}" for name, why in failed.items())
+            raise ComputationError(f"reproduce: {len(failed)} of {len(TARGETS)} figures failed: {told}")
         return
     [result] = done
     lines = [f"  {name:28} {value}" for name, value in result.numbers.items()]
-    paths = pictures[result.name]
+    paths = files[result.name]
     text = "\n".join([*lines, *(f"picture: {path}" for path in paths)])
     emit(text, {"figure": result.name, "picture": paths[0], "files": paths, "numbers": result.numbers}, json)
+
+
+def _words(text: str) -> list[str]:
+    """The words of a list by commas."""
+    return [word for each in text.split(",") if (word := each.strip().lower())]
 
 
 commands = (simulate, steer, reproduce)

@@ -16,7 +16,7 @@ from lie_codegen.errors import InertiaWarning
 from lie_codegen.gallery.attitude_style import bare_3d, quiet, sphere, tidy
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, COLOURS, GREY
+from lie_codegen.pictures.style import BLUE, COLOURS, GREY, caption
 from lie_codegen.runtime.build import build_kernels
 
 _INERTIA, _K_P, _K_D = (6, 3, 1), 4, 6
@@ -70,7 +70,7 @@ def _exponential() -> Any:
 def _draw(t: NDArray[Any], theta: NDArray[Any], omega: NDArray[Any], paths: NDArray[Any]) -> Any:
     figure = new_figure(11, 9)
     figure.suptitle(
-        "Attitude by the law (18), gyroscopic torque cancelled; I = diag(6, 3, 1), k_p = 4, k_d = 6", fontsize=12
+        "Attitude by the law (18) of Geyer, gyroscopic torque cancelled: $I = $diag(6, 3, 1), $k_p = 4$, $k_d = 6$"
     )
     left, right = figure.add_subplot(2, 2, 1), figure.add_subplot(2, 2, 2)
     for axes, values, name, unit in ((left, theta, r"\theta", "rad"), (right, omega, r"\omega", "rad/s")):
@@ -90,4 +90,8 @@ def _draw(t: NDArray[Any], theta: NDArray[Any], omega: NDArray[Any], paths: NDAr
         axes.set_title(
             f"({'cd'[place - 3]}) 24 runs in exponential coordinates, " + ("left eye" if place == 3 else "right eye")
         )
+    caption(
+        figure,
+        "(a), (b): Figure 1's run. (c), (d): rotation vectors in the ball of radius $\\pi$; squint to see them in space.",
+    )
     return figure

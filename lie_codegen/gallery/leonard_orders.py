@@ -13,7 +13,7 @@ from lie_codegen.averaging.printed_form import printed_state
 from lie_codegen.gallery.leonard_style import SEQUENCE, eps_axis, plain
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, RED
+from lie_codegen.pictures.style import BLUE, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _ZERO = (
@@ -114,6 +114,7 @@ def _draw(
         eps_axis(axes, _EPS)
         axes.legend(frameon=False, fontsize=8)
     plain(*panels.ravel())
+    caption(figure, "Numbers in the legends: the slope between the two smallest eps, which is the order of the error.")
     return figure
 
 

@@ -71,7 +71,9 @@ def _draw(x_dot: PeriodicInput, averaged: Any, flow: Any, errors: Any) -> Any:
     figure = new_figure(12, 7.5)
     grid = figure.add_gridspec(2, 3)
     figure.suptitle("A spacecraft turned by a vibrating point mass (TR 93-59, Figure 5)")
-    caption(figure, "Attitude: the body simulated with its exact locked inertia (colours), both averages (black).")
+    caption(
+        figure, "Attitude: the body simulated with its exact locked inertia (colours), both averages (dotted, dashed)."
+    )
     _sketch(figure.add_subplot(grid[:, 0], projection="3d"), x_dot)
     paths, shown = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     drift, order = figure.add_subplot(grid[0, 2]), figure.add_subplot(grid[1, 2])

@@ -18,7 +18,7 @@ from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.gallery.leonard_style import eps_axis, plain
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, GREEN, RED
+from lie_codegen.pictures.style import BLUE, GREEN, RED, caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _EPS = (0.4, 0.2, 0.1, 0.05)
@@ -94,4 +94,8 @@ def _draw(pair: tuple[PeriodicInput, PeriodicInput], loops: list[Any], moved: di
         eps_axis(panel, _EPS)
         panel.legend(frameon=False, fontsize=8)
     plain(*panels.ravel())
+    caption(
+        figure,
+        "Right: the motion along the bracket after one period, whose leading part is the area; crosses: what the area leaves out.",
+    )
     return figure

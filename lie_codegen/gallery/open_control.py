@@ -13,7 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.gallery.open_problems import parking, quadrotor, qubit, satellite, underwater
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.steering_loops import COLOURS, GREY
+from lie_codegen.pictures.style import COLOURS, GREY, caption, symbol
 from lie_codegen.steering.ocp.mpc import mpc
 from lie_codegen.steering.ocp.plan import OptimalPlan
 
@@ -39,9 +39,14 @@ def open_quadrotor(folder: Path, progress: Progress = _quiet) -> GalleryResult:
     left.plot(plan.X[:, 0, 3], plan.X[:, 1, 3], color=COLOURS[0], label="plan, 1.5 s")
     left.plot(run.X[:, 0, 3], run.X[:, 1, 3], "--", color=COLOURS[1], label="loop in noise, 3 s")
     _finish(left, "from above", "x [m]", "y [m]", equal=True)
-    _controls(right, plan, ("thrust / mass [m/s2]", "roll rate", "pitch rate", "yaw rate [rad/s]"))
+    _controls(right, plan, ("thrust / mass [m/s$^2$]", "roll rate [rad/s]", "pitch rate [rad/s]", "yaw rate [rad/s]"))
     depth = cylinder[2] - np.min(np.hypot(run.X[:, 0, 3] - 1.0, run.X[:, 1, 3] - 0.05))
     numbers = {**_numbers(plan), "deepest_in_the_cylinder_m": float(depth), "samples_held": run.status.count("held")}
+    figure.suptitle("A quadrotor around a cylinder")
+    caption(
+        figure,
+        "The best of eight starts, thrust and rates bounded; dashed: one sweep of the solver a sample, place and velocity measured with noise.",
+    )
     return save("open_quadrotor", folder, figure, numbers)
 
 
@@ -56,19 +61,23 @@ def open_satellite(folder: Path, progress: Progress = _quiet) -> GalleryResult:
     left.plot(plan.t, angles, color=COLOURS[0], label="angle of the star tracker to the sun")
     left.axhline(0.3, color=GREY, lw=0.8)
     for i in range(3):
-        left.plot(plan.t, plan.states["w"][:, i], color=COLOURS[i + 1], label=f"w{i + 1} [rad/s]")
-    _finish(left, "kept out of a cone of 0.3 rad", "t [s]", "rad")
+        left.plot(plan.t, plan.states["w"][:, i], color=COLOURS[i + 1], label=f"{symbol(f'w{i + 1}')} [rad/s]")
+    _finish(left, "kept out of a cone of 0.3 rad", "t [s]", "angle [rad], rate [rad/s]")
     _controls(right, plan, tuple(f"wheel torque {i} [N m]" for i in (1, 2, 3)))
     numbers = {
         **_numbers(plan),
         "smallest_angle_to_the_sun_rad": float(np.min(angles)),
         "attitude_error_rad": plan.error,
     }
+    figure.suptitle("A satellite with three wheels whose star tracker keeps off the sun")
+    caption(
+        figure, "The best of eight starts, to rest in 20 s; grey: half angle of the cone. Torques of 0.4 N m at most."
+    )
     return save("open_satellite", folder, figure, numbers)
 
 
 def open_parking(folder: Path, progress: Progress = _quiet) -> GalleryResult:
-    """Half a metre sideways in six seconds, from rest to rest."""
+    """One metre sideways and half a metre on in six seconds, from rest to rest."""
     goal = np.array([[1, 0, 0.5], [0, 1, 1.0], [0, 0, 1]])
     progress("eight starts")
     plan = parking().solve(starts=8, goal=goal)
@@ -79,7 +88,9 @@ def open_parking(folder: Path, progress: Progress = _quiet) -> GalleryResult:
         corners = np.array([[-0.5, -0.8, 1], [3, -0.8, 1], [3, 0.8, 1], [-0.5, 0.8, 1], [-0.5, -0.8, 1]])
         left.plot(*(corners @ X.T)[:, :2].T, color=GREY, lw=0.5)
     _finish(left, "parking", "x [m]", "y [m]", equal=True)
-    _controls(right, plan, ("acceleration [m/s2]", "steering rate [rad/s]"))
+    _controls(right, plan, ("acceleration [m/s$^2$]", "steering rate [rad/s]"))
+    figure.suptitle("A car parked one metre sideways and half a metre on")
+    caption(figure, "The best of eight starts, from rest to rest in six seconds; grey: the car every half second.")
     return save("open_parking", folder, figure, {**_numbers(plan), "pose_error": plan.error})
 
 
@@ -101,8 +112,13 @@ def open_underwater(folder: Path, progress: Progress = _quiet) -> GalleryResult:
     left.plot(*goal[:2, 3], "k+")
     _finish(left, "a vehicle in a current along y", "x [m]", "y [m]", equal=True)
     if plan is not None:
-        _controls(right, plan, ("torque 1 [N m]", "torque 2", "torque 3", "thrust [N]"))
+        _controls(right, plan, ("torque 1 [N m]", "torque 2 [N m]", "torque 3 [N m]", "thrust [N]"))
         numbers["status"] = plan.status.name
+    figure.suptitle("An underwater vehicle with three torques and one thruster, in a current")
+    caption(
+        figure,
+        "One problem, built once: the current is a parameter. The cross is the goal; right: controls against -0.2 m/s.",
+    )
     return save("open_underwater", folder, figure, numbers)
 
 
@@ -115,9 +131,11 @@ def open_qubit(folder: Path, progress: Progress = _quiet) -> GalleryResult:
     figure = new_figure(11, 4.5)
     left, right = figure.subplots(1, 2)
     for i, name in enumerate("xyz"):
-        left.plot(plan.t, bloch[:, i], color=COLOURS[i], label=f"Bloch vector of X|0>, {name}")
-    _finish(left, "a gate with a detuned qubit", "t [s]", "")
+        left.plot(plan.t, bloch[:, i], color=COLOURS[i], label=rf"${name}$")
+    _finish(left, r"Bloch vector of $X(t)|0\rangle$", "t [s]", "component")
     _controls(right, plan, ("drive x [rad/s]", "drive y [rad/s]"))
+    figure.suptitle("A Hadamard gate of a detuned qubit by a bounded drive")
+    caption(figure, "The best of eight starts; the drive is constant in each of 40 intervals.")
     fidelity = abs(np.trace(gate.conj().T @ plan.X_final)) / 2
     return save("open_qubit", folder, figure, {**_numbers(plan), "fidelity": float(fidelity), "gate_error": plan.error})
 
@@ -149,7 +167,7 @@ def _disc(cylinder: Array) -> Any:
 def _controls(axes: Any, plan: OptimalPlan, names: tuple[str, ...]) -> None:
     for i, name in enumerate(names):
         axes.stairs(plan.u[:, i], plan.t, color=COLOURS[i], label=name, baseline=None)
-    _finish(axes, "controls, within their bounds exactly", "t [s]", "")
+    _finish(axes, "controls, within their bounds exactly", "t [s]", "control, units in the legend")
 
 
 def _finish(axes: Any, title: str, x: str, y: str, *, equal: bool = False) -> None:

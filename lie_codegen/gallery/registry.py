@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.errors import InputError
-from lie_codegen.pictures.result import GalleryResult, check_format
+from lie_codegen.pictures.result import GalleryResult, file_ending
 from lie_codegen.pictures.style import style
 
 
@@ -50,7 +50,7 @@ TARGETS = (
     ),
     Target("open_quadrotor", "open_control", "a quadrotor around a cylinder: plan, and the loop in noise"),
     Target("open_satellite", "open_control", "a satellite with three wheels and a star tracker that keeps off the sun"),
-    Target("open_parking", "open_control", "a car parked half a metre sideways"),
+    Target("open_parking", "open_control", "a car parked one metre sideways"),
     Target("open_underwater", "open_control", "an underwater vehicle in a current, which is a parameter"),
     Target("open_qubit", "open_control", "a gate of a detuned qubit by a bounded drive"),
     Target(
@@ -109,18 +109,25 @@ def target(name: str) -> Target:
 
 
 def reproduce(
-    name: str, folder: Path, progress: Callable[[str], None], formats: Sequence[str] = ("png",)
+    name: str,
+    folder: Path,
+    progress: Callable[[str], None],
+    formats: Sequence[str] = ("png",),
+    themes: Sequence[str] = ("light",),
 ) -> GalleryResult:
-    """Runs a target; its picture and numbers are written to the folder, the PNG always, "svg" and "pdf" where asked.
+    """Runs a target; its numbers and its light PNG are written to the folder always, each format in each theme where asked.
 
     Raises:
-        InputError: no such target or format, told before anything is computed.
+        InputError: no such target, format or theme, told before anything is computed.
     """
     chosen = target(name)
-    more = [check_format(each) for each in formats if each != "png"]
+    asked = [(format, theme) for theme in themes for format in formats]
+    for format, theme in asked:
+        file_ending(format, theme)
     function: Any = getattr(import_module(f"lie_codegen.gallery.{chosen.module}"), name)
     with style():
         result: GalleryResult = function(folder, progress)
-        for each in more:
-            result.write(each)
+        for format, theme in asked:
+            if (format, theme) != ("png", "light"):
+                result.write(format, theme)
     return result

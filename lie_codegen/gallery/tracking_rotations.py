@@ -15,7 +15,7 @@ from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.gallery.attitude_style import brick, quiet
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, GREEN, GREY, RED
+from lie_codegen.pictures.style import BLUE, GREEN, GREY, RED, caption
 
 #: The angle 2 pi (3 t^2 - t^3/5)/100: rest to rest in 10 s through 2 pi; the printed velocity 2 pi (3 t^2 - t)/100
 # makes 19 pi.
@@ -67,4 +67,8 @@ def _draw(R_d: NDArray[Any], runs: dict[str, ClosedLoop]) -> Any:
         axes.text(1.5 * number, 0.85, f"{10 * number / 8:.3g} s", ha="center", color=GREY)
     axes.set(aspect="equal", xlim=(-3.4, 13), ylim=(-3.8, 1.1))
     axes.axis("off")
+    caption(
+        figure,
+        "No error feedback: the left error keeps the body's error fixed in space, the right one fixed in the reference's frame.",
+    )
     return figure

@@ -9,7 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.errors import InputError, MissingDependencyError, write_refusal
+from lie_codegen.pictures.dark import dark
+from lie_codegen.pictures.style import style
 
+#: How a figure is drawn: on white, or on the dark page.
+THEMES = ("light", "dark")
 #: The formats a figure can be written in; the dates left out, so that equal figures are equal files.
 FORMATS: dict[str, dict[str, None]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
@@ -30,14 +34,16 @@ class GalleryResult:
     numbers: Mapping[str, Any]
     figure: Any = field(default=None, repr=False, compare=False)
 
-    def write(self, format: str) -> Path:
-        """The figure once more beside its PNG, as "svg" or "pdf": lines and letters that stay sharp at any size.
+    def write(self, format: str, theme: str = "light") -> Path:
+        """The figure once more beside its PNG: "png", or "svg" and "pdf" that stay sharp at any size; NAME.svg, or NAME-dark.svg.
 
         Raises:
-            InputError: any other format.
+            InputError: any other format or theme.
             OutputFolderError: the folder cannot be written.
         """
-        return write_figure(self.figure, self.picture.parent / f"{self.name}.{check_format(format)}")
+        path = self.picture.parent / f"{self.name}{file_ending(format, theme)}"
+        with style():
+            return write_figure(self.figure if theme == "light" else dark(self.figure), path)
 
 
 def check_format(format: str) -> str:
@@ -49,6 +55,17 @@ def check_format(format: str) -> str:
     if format not in FORMATS:
         raise InputError(f"no picture format {format!r}; there are {', '.join(FORMATS)}")
     return format
+
+
+def file_ending(format: str, theme: str) -> str:
+    """What follows the name of a figure in that of its file: ".svg", "-dark.png".
+
+    Raises:
+        InputError: no such format or theme; lists those there are.
+    """
+    if theme not in THEMES:
+        raise InputError(f"no theme {theme!r} of pictures; there are {', '.join(THEMES)}")
+    return f"{'' if theme == 'light' else '-' + theme}.{check_format(format)}"
 
 
 def write_figure(figure: Any, path: Path) -> Path:

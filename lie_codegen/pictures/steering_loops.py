@@ -67,15 +67,19 @@ def _segments(axes: Any, plan: Plan, chain: Chain) -> None:
         if isinstance(segment, Loop):
             first, second = curve[:, segment.pair[0]], curve[:, segment.pair[1]]
             a, b = (plan.controls[k] for k in segment.pair)
-            label = f"{a}, {b}: area {x[0]:.4g}, [{a}, {b}]"
+            label = f"{symbol(a)}, {symbol(b)}: area {x[0]:.4g}, [{symbol(a)}, {symbol(b)}]"
         else:
             first, second = curve @ np.array(segment.a), curve @ np.array(segment.b)
             a, b = (combination(each, plan.controls) for each in (segment.a, segment.b))
-            label = f"a = {a}, b = {b}:\n moment {x[0]:.4g}, [a, [a, b]]"
+            label = f"$a$ = {symbol(a)}, $b$ = {symbol(b)}:\n moment {x[0]:.4g}, $[a, [a, b]]$"
         axes.fill(first, second, color=colour, alpha=0.12)
         axes.plot(first, second, color=colour, label=label)
     rounds = f", each driven {chain.repeats} times" if chain.repeats > 1 else ""
-    axes.set(title="loops and figures of eight" + rounds, xlabel="int of the first", ylabel="int of the second")
+    axes.set(
+        title="loops and figures of eight" + rounds,
+        xlabel=r"$\int$ of the first $dt$",
+        ylabel=r"$\int$ of the second $dt$",
+    )
 
 
 def combination(weights: Any, labels: tuple[str, ...]) -> str:
