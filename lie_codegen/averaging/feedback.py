@@ -96,14 +96,7 @@ class FeedbackAverage(Saved):
     @property
     def kernel(self) -> Kernel:
         """(g, parameters) -> g_dot per unit eps, as a kernel named averaged_feedback."""
-        n = self.group.dim
-        inputs = [Port("g", (n,), ", ".join(self.group.units) if any(self.group.units) else "")]
-        inputs += [Port(str(symbol), (), description="parameter of the feedback") for symbol in self.parameters]
-        body = expression_body([self.g, *self.parameters], [list(self.rate)])
-        formula = "g' / eps = M(g) (1/T) int_0^T u(t, g) dt"
-        return Kernel(
-            "averaged_feedback", self.group.name, tuple(inputs), (Port("g_dot", (n,)),), body, formula, "TR 93-59, (18)"
-        )
+        return averaged_feedback_kernel(self)
 
     def linearise(self, g: ArrayLike, **values: Any) -> Stability:
         """Stability of the equilibrium g of the averaged system, at numeric parameters, by Lyapunov's indirect method.
@@ -205,6 +198,17 @@ class FeedbackAverage(Saved):
         length = float(self.period.subs(numbers))
         function = sp.lambdify([time_symbol()], list(self.u.subs(at)), "numpy")
         return all(np.max(np.abs(np.array(function(t), dtype=float))) < 1e-9 for t in np.linspace(0, length, 37))
+
+
+@kernel_factory()
+def averaged_feedback_kernel(average: FeedbackAverage, name: str = "averaged_feedback") -> Kernel:
+    """(g, parameters) -> g_dot per unit eps."""
+    group, n = average.group, average.group.dim
+    inputs = [Port("g", (n,), ", ".join(group.units) if any(group.units) else "")]
+    inputs += [Port(str(symbol), (), description="parameter of the feedback") for symbol in average.parameters]
+    body = expression_body([average.g, *average.parameters], [list(average.rate)])
+    formula = "g' / eps = M(g) (1/T) int_0^T u(t, g) dt"
+    return Kernel(name, group.name, tuple(inputs), (Port("g_dot", (n,)),), body, formula, "TR 93-59, (18)")
 
 
 @kernel_factory()

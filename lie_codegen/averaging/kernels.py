@@ -24,6 +24,7 @@ from lie_codegen.groups.wei_norman.body import product_exp, rate
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
 from lie_codegen.kernel.linear import Vector, matmul, plus, scaled
@@ -38,6 +39,7 @@ _EPS = Port("eps", (), "1", description="amplitude that scales u")
 _T = Port("t", (), "s", description="time")
 
 
+@kernel_factory()
 def averaged_kernels(averaged: Averaged, statement: str = "") -> tuple[Kernel, ...]:
     """averaged_rate, averaged_state and periodic_input of an average; parameters become scalar inputs by their names.
 
@@ -57,6 +59,7 @@ def averaged_kernels(averaged: Averaged, statement: str = "") -> tuple[Kernel, .
     return averaged_rate(averaged, statement), averaged_state(averaged, statement), periodic_input(averaged)
 
 
+@kernel_factory()
 def averaged_rate(averaged: Averaged, statement: str = "") -> Kernel:
     """(eps, parameters) -> rate: the mean velocity sum eps^q F_q."""
     symbols = averaged.parameters
@@ -72,6 +75,7 @@ def averaged_rate(averaged: Averaged, statement: str = "") -> Kernel:
     return Kernel("averaged_rate", group.name, inputs, (output,), body, formula, _SOURCE[averaged.form], sampler)
 
 
+@kernel_factory()
 def averaged_state(averaged: Averaged, statement: str = "") -> Kernel:
     """(eps, t, parameters) -> X."""
     group, symbols = averaged.group, averaged.parameters
@@ -102,6 +106,7 @@ def averaged_state(averaged: Averaged, statement: str = "") -> Kernel:
     return Kernel("averaged_state", group.name, inputs, (output,), body, formula, _SOURCE[averaged.form], sampler)
 
 
+@kernel_factory()
 def averaged_wei_norman(averaged: Averaged) -> Kernel:
     """(eps, g, parameters) -> g_dot: the averaged Wei-Norman equations (11); Phi(gbar(t)) = X(0) exp(eps t U_av), Theorem 1."""
     group, symbols = averaged.group, averaged.parameters
@@ -118,6 +123,7 @@ def averaged_wei_norman(averaged: Averaged) -> Kernel:
     return Kernel("averaged_wei_norman", group.name, inputs, (output,), body, formula, source)
 
 
+@kernel_factory()
 def periodic_input(averaged: Averaged) -> Kernel:
     """(t, parameters) -> u."""
     group, symbols = averaged.group, averaged.parameters

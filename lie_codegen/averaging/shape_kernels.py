@@ -13,6 +13,7 @@ from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.brackets import bracket
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, dot, plus, scaled
@@ -23,6 +24,7 @@ NAMESPACE = "shape"
 SOURCE = "TR 93-59, section 6; Hatton and Choset, IEEE T-RO 29 (2013)"
 
 
+@kernel_factory()
 def connection_kernels(connection: ShapeForm, harmonics: int = 3) -> tuple[Kernel, ...]:
     """connection: r -> A(r); shape_velocity: (r, v) -> xi = -A(r) v, for lc.ocp; gait_step: (X, gait, t, h) -> X_next, one Magnus step of order 4 along a Fourier series of period 2 pi.
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.formula_records import formula_record, read_formula
 from lie_codegen.kernel.plain_data import Definition, NoDefinitionError, made_from, makes_records
 
 
@@ -113,7 +114,7 @@ def encoded(value: Any, arrays: dict[str, Array], where: str) -> Any:
         kept_values = {name: encoded(getattr(value, name), arrays, f"{where}.{name}") for name in kept}
         return {"record": _name_of(type(value)), "fields": kept_values}
     if type(value).__module__.startswith("sympy."):
-        return _formula(value, where)
+        return formula_record(value, where)
     raise InputError(f"{where} cannot be saved: {type(value).__name__} is no data")
 
 
@@ -126,41 +127,6 @@ def _kept_names(kind: type) -> tuple[str, ...] | None:
     if hasattr(kind, "__dataclass_fields__"):
         return tuple(field.name for field in fields(kind) if field.init and not field.metadata.get("derived"))
     return getattr(kind, "SAVED", None)
-
-
-def _formula(value: Any, where: str) -> dict[str, Any]:
-    """A SymPy expression in the closed grammar of formulas, its symbols named; one that cannot be written so is refused."""
-    if getattr(value, "is_Matrix", False):
-        entries = [_formula(entry, f"{where}[{i}]") for i, entry in enumerate(value.flat())]
-        return {"matrix": entries, "shape": list(value.shape)}
-    free = sorted(getattr(value, "free_symbols", ()), key=lambda symbol: symbol.name)
-    record: dict[str, Any] = {"formula": str(value), "symbols": [symbol.name for symbol in free]}
-    others = {symbol.name: assumed for symbol in free if (assumed := _assumed(symbol)) != {"real": True}}
-    record |= {"assumptions": others} if others else {}
-    try:
-        readable = _read_formula(record) == value
-    except InputError:
-        readable = False
-    if not readable:
-        raise InputError(f"{where} cannot be saved: {value!s:.60} is no formula of the closed grammar")
-    return record
-
-
-def _assumed(symbol: Any) -> dict[str, bool]:
-    """What makes an equal symbol: the few assumptions that say it, or all that follow from them."""
-    few: tuple[dict[str, bool], ...] = ({"real": True}, {}, {"positive": True})
-    return next((each for each in few if type(symbol)(symbol.name, **each) == symbol), dict(symbol.assumptions0))
-
-
-def _read_formula(record: Mapping[str, Any]) -> Any:
-    import sympy as sp
-
-    from lie_codegen.exact.expression import FORMULA_FUNCTIONS, NUMBER_NAMES, parse_expression
-
-    others = record.get("assumptions", {})
-    names = {str(name): sp.Symbol(str(name), **others.get(name, {"real": True})) for name in record["symbols"]}
-    names = {**NUMBER_NAMES, **names}
-    return parse_expression(record["formula"], names, FORMULA_FUNCTIONS)
 
 
 def _name_of(kind: type) -> str:
@@ -204,12 +170,8 @@ def _record(record: dict[str, Any], arrays: Mapping[str, Array], path: str) -> A
     if "definition" in record:
         check_kinds(record["definition"], path)
         return made_from(record["definition"])
-    if "formula" in record:
-        return _read_formula(record)
-    if "matrix" in record:
-        from sympy import ImmutableMatrix
-
-        return ImmutableMatrix(*record["shape"], [decoded(entry, arrays, path) for entry in record["matrix"]])
+    if not {"formula", "tree", "matrix"}.isdisjoint(record):
+        return read_formula(record)
     made = _class_of(record["record"], path, enum=False)
     unknown = sorted(set(record["fields"]) - set(_kept_names(made) or ()))
     if unknown:

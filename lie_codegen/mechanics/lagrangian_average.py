@@ -9,6 +9,7 @@ from typing import Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, plus, scaled
@@ -88,6 +89,7 @@ class LagrangianSeries:
         return self.series.inputs[0].period
 
 
+@kernel_factory()
 def series_kernels(fields: LagrangianSeries, namespace: str) -> tuple[Kernel, ...]:
     """rate, actual, estimate, estimate_first, reconstruct and one kernel a term, as those of `vibrational_kernels`."""
     n, series = len(fields.state), fields.series

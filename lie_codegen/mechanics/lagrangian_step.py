@@ -16,6 +16,7 @@ from typing import Any
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -27,6 +28,7 @@ from lie_codegen.on_demand import sympy as sp
 _NEWTON = 4
 
 
+@kernel_factory()
 def lagrangian_variational_step(
     system: LagrangianSystem, name: str = "variational_step", namespace: str = "lagrangian"
 ) -> Kernel:

@@ -14,6 +14,7 @@ from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import dexp_inverse
+from lie_codegen.kernel.definition import double, kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, plus, scaled
 from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
@@ -32,6 +33,7 @@ _FLOW_STEPS = 2
 Rate = Callable[[float, Vector], tuple[Vector, Vector]]
 
 
+@kernel_factory()
 def rate_kernel(fields: MechanicalFields, name: str = "rate") -> Kernel:
     """(xi, advected.., eps) -> (alpha, beta): X' = X hat(alpha), xi' = beta of the averaged system."""
     system, n = fields.system, fields.system.dim
@@ -48,6 +50,7 @@ def rate_kernel(fields: MechanicalFields, name: str = "rate") -> Kernel:
     )  # fmt: skip
 
 
+@kernel_factory()
 def actual_kernel(fields: MechanicalFields, name: str = "actual") -> Kernel:
     """(xi, advected.., tau, eps) -> beta: xi' of the actual system at fast time tau."""
     system, n = fields.system, fields.system.dim
@@ -62,6 +65,7 @@ def actual_kernel(fields: MechanicalFields, name: str = "actual") -> Kernel:
     )  # fmt: skip
 
 
+@kernel_factory(eps=double)
 def loop_kernel(fields: MechanicalFields, eps: float, name: str = "loop") -> Kernel:
     """(y, t) -> y_dot of y = (xi, advected vectors) under the forces of time t: what lc.floquet takes."""
     system, n = fields.system, fields.system.dim
@@ -120,6 +124,7 @@ def actual_step(fields: MechanicalFields) -> Kernel:
     return _step(fields.system, "actual_step", (_tau(), _eps(), Port("h", (), "s")), body, "actual system")
 
 
+@kernel_factory()
 def reconstruct_kernel(fields: MechanicalFields, *, back: bool) -> Kernel:
     """(X, xi, advected.., tau, eps) -> (X_next, xi_next): the actual state of an averaged one, or back."""
     system, n, group = fields.system, fields.system.dim, fields.system.group

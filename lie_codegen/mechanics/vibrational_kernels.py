@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
@@ -17,6 +18,7 @@ _EPS = Port("eps", (), "1", description="ratio of the fast to the slow time scal
 _TAU = Port("tau", (), "1", description="fast time t / eps")
 
 
+@kernel_factory()
 def vibrational_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kernel, ...]:
     """rate (averaged), actual, estimate, estimate_first and reconstruct of an averaged system.
 
@@ -76,6 +78,7 @@ def vibrational_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kern
     )
 
 
+@kernel_factory()
 def term_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kernel, ...]:
     """term_q(z) = Z_q(z), one kernel an order; parameters that stayed symbols are further inputs."""
     n = len(fields.state)
@@ -93,6 +96,7 @@ def term_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kernel, ...
     return tuple(kernel(q) for q in range(1, fields.order + 1))
 
 
+@kernel_factory()
 def lagrangian_kernels(system: LagrangianSystem, namespace: str = "lagrangian") -> tuple[Kernel, ...]:
     """rate(y, u, parameters...) -> y' = X(y) + Y_a(q) u^a, and energy(y, parameters...) -> kinetic plus potential."""
     n, m = len(system.state), len(system.inputs)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import plus
@@ -18,6 +19,7 @@ from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
 SOURCE = "Sanyal, Bloch and McClamroch, Theorem 2 corrected: averaged equilibrium, amplitude held over a period"
 
 
+@kernel_factory()
 def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int = 60) -> tuple[Kernel, ...]:
     """command, force and loop of a designed feedback: all a flight computer needs, and the plant to test it on.
 

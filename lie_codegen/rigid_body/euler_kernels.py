@@ -8,6 +8,7 @@ from typing import Any
 
 from lie_codegen.averaging.phase_routine import Nodes
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.elliptic import Jacobi, Ladder, jacobi, ladder, phase
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -33,6 +34,7 @@ _SPIN = Port("omega", (3,), "rad/s")
 _TAU = Port("tau", (), "s", description="slow time eps t")
 
 
+@kernel_factory()
 def to_slow(body: PrincipalBody, namespace: str) -> Kernel:
     """omega -> (Omega, k, phi): Omega = sqrt(w3^2 + (w2 / G23)^2), k = sqrt((w1 / G13)^2 + (w2 / G23)^2) / Omega."""
 
@@ -50,6 +52,7 @@ def to_slow(body: PrincipalBody, namespace: str) -> Kernel:
     )
 
 
+@kernel_factory()
 def from_slow(body: PrincipalBody, namespace: str) -> Kernel:
     """(Omega, k, phi) -> omega, (9)."""
 
@@ -60,6 +63,7 @@ def from_slow(body: PrincipalBody, namespace: str) -> Kernel:
     return _kernel("from_slow", namespace, body.is_constant, _SLOW, (_SPIN,), make, formula, "(9)-(10)", sample_slow)
 
 
+@kernel_factory()
 def frequency(body: PrincipalBody, namespace: str) -> Kernel:
     """(Omega, k) -> Lambda, the rate of phi without perturbation."""
     expression = EulerPerturbation(body, (sp.S.Zero, sp.S.Zero, sp.S.Zero)).frequency
@@ -73,6 +77,7 @@ def frequency(body: PrincipalBody, namespace: str) -> Kernel:
     )  # fmt: skip
 
 
+@kernel_factory()
 def constants_of_motion(body: PrincipalBody, namespace: str) -> Kernel:
     """omega -> (T, L): kinetic energy and magnitude of the angular momentum, (5)."""
 
@@ -85,6 +90,7 @@ def constants_of_motion(body: PrincipalBody, namespace: str) -> Kernel:
     return _kernel("constants_of_motion", namespace, body.is_constant, (_SPIN,), outputs, make, "T and |L|", "(5)")
 
 
+@kernel_factory()
 def variational(perturbation: EulerPerturbation, namespace: str) -> Kernel:
     """(Omega, k, phi) -> (F_Omega, F_k, G, Lambda), Table 2, per unit eps."""
     expressions = (*perturbation.variational, perturbation.frequency)
@@ -101,6 +107,7 @@ def variational(perturbation: EulerPerturbation, namespace: str) -> Kernel:
     )
 
 
+@kernel_factory()
 def averaged(perturbation: EulerPerturbation, namespace: str, nodes: int) -> Kernel:
     """(Omega, k) -> (F_Omega, F_k, G), averaged: Table 3 where it applies, else the trapezoid rule in phi."""
     closed = perturbation.averaged
@@ -113,6 +120,7 @@ def averaged(perturbation: EulerPerturbation, namespace: str, nodes: int) -> Ker
     )  # fmt: skip
 
 
+@kernel_factory()
 def rate(perturbation: EulerPerturbation, namespace: str) -> Kernel:
     """(omega, eps) -> omega', the full equations (3); dw in g is the unperturbed acceleration."""
     body = perturbation.body
@@ -151,6 +159,7 @@ def _trapezoid(perturbation: EulerPerturbation, namespace: str, nodes: int) -> C
     return make
 
 
+@kernel_factory()
 def averaged_rate(perturbation: EulerPerturbation, namespace: str) -> Kernel | None:
     """(y, t, eps) -> y' of the averaged system, y = (Omega, k, phi), by Table 3; None where it does not apply."""
     closed = perturbation.averaged

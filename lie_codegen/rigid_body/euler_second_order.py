@@ -12,6 +12,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.phase_routine import Clock, Node, Nodes, phase_kernels, phase_routine
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS, jacobi, ladder
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel
@@ -130,6 +131,7 @@ def phase_loop(perturbation: EulerPerturbation, namespace: str, nodes: Nodes = N
     return phase_routine(name, namespace, *phase_system(perturbation), nodes, key)
 
 
+@kernel_factory()
 def second_order_kernels(perturbation: EulerPerturbation, namespace: str) -> tuple[Kernel, ...]:
     """terms, near_identity, mean_rate and actual_rate of (Omega, k) and phi; tau is a third slow variable of rate 1."""
 

@@ -15,6 +15,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.averaging.near_identity import to_mean
 from lie_codegen.averaging.time_routine import time_kernels, time_routine
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.rigid_body.euler_second_order import MARGIN, inside, phase_system
@@ -26,6 +27,7 @@ ORDER, NODES = 3, 64
 _ROUNDS = 40
 
 
+@kernel_factory()
 def phase_time_kernels(perturbation: EulerPerturbation, namespace: str) -> tuple[Kernel, ...]:
     """terms, near_identity, mean_rate and actual_rate of (Omega, k, s) over phi, to order 3; s = eps t is the tau of the body."""
     node, clock, n = phase_system(perturbation)

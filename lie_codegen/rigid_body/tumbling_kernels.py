@@ -10,6 +10,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import doubles, kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import call_routine
 from lie_codegen.rigid_body.rotation_formulas import about_third, apply, multiply, transpose
@@ -29,6 +30,7 @@ NAMESPACE = "tumbling"
 MARGIN = 0.999
 
 
+@kernel_factory(J=doubles)
 def tumbling_kernels(J: Array, torques: Sequence[Torque], namespace: str = NAMESPACE) -> tuple[Kernel, ...]:
     """slow_rate, shape, ends, periodic, torque_at and direct_rate of a body under torques.
 

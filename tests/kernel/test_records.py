@@ -27,6 +27,8 @@ x, p, n = sp.Symbol("x", real=True), sp.Symbol("p", positive=True), sp.Symbol("n
         sp.ImmutableMatrix([[x, sp.sqrt(2) / 2], [0, sp.sin(x) ** 2]]),
         sp.ImmutableMatrix(0, 3, []),
         sp.sqrt(p**2 + 1) * p,
+        sp.Mul(sp.Integer(-1), x + sp.sin(p) + 1, sp.Pow(x**2 + 1, -1)),
+        (x + 1) * sp.Abs(x - sp.Rational(1, 3)) ** sp.Rational(1, 2),
         sp.cos(sp.Symbol("z")) + n,
         {(1, -2): 0.1, "text": float("inf"), (0,): [complex(1, -0.0)], 3: None},
         np.array([[0.1, float("nan")], [-0.0, 5e-324]]),
@@ -79,12 +81,27 @@ def definition_of_a_kernel(value: Any) -> Any:
     return definition_of("lie_codegen.control.attitude_law:attitude_law", {"record": value, "k": Fraction(1, 3)})
 
 
+def test_a_formula_outside_the_grammar_is_refused() -> None:
+    for value in (sp.gamma(x), sp.Integral(sp.exp(-(x**2)), x), sp.Float("0.1")):
+        with pytest.raises(InputError, match="it cannot be saved"):
+            encoded(value, {}, "it")
+
+
 def test_what_is_no_data_has_no_definition(odd: type[Odd]) -> None:
     with pytest.raises(NoDefinitionError, match=r"Odd\.parameters cannot be saved: function is no data"):
         plain(odd("a", lambda: 0))
 
 
-@pytest.mark.parametrize("record", [[], {"record": "os:system", "fields": {}}, {"array": "a7"}, {"tuple": 3}])
+@pytest.mark.parametrize(
+    "record",
+    [
+        [],
+        {"record": "os:system", "fields": {}},
+        {"array": "a7"},
+        {"tuple": 3},
+        {"tree": ["Lambda", ["number", "1"]], "symbols": []},
+    ],
+)
 def test_a_damaged_record_is_refused(record: Any) -> None:
     with pytest.raises(InputError):
         decoded(record, {}, "the file")

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector
 
@@ -50,6 +51,7 @@ def rotation_entries(q: Sequence[Scalar], places: Sequence[int]) -> Matrix:
     ]
 
 
+@kernel_factory()
 def with_quaternion(law: Kernel, *, order: str | None = None) -> Kernel:
     """The same law with its (3, 3) inputs X and X_d as unit quaternions q and q_d.
 
