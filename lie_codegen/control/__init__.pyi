@@ -6,8 +6,8 @@ from .attitude import attitude_region as attitude_region
 from .attitude import cross_term_bound as cross_term_bound
 from .attitude import gains_for_response as gains_for_response
 from .attitude_law import attitude_law as attitude_law
-from .certificate import Certificate as Certificate
 from .certificate import certificate as certificate
+from .certificate_record import Certificate as Certificate
 from .closed_loop import ClosedLoop as ClosedLoop
 from .closed_loop import closed_loop as closed_loop
 from .closed_loop_package import generate_closed_loop as generate_closed_loop

@@ -8,8 +8,8 @@ for the loop as Theorem 4.2 has it: the force of the law itself, all the time, o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,148 +18,26 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.certificate_constants import Metric, hessian_bound, quadratic_bounds
 from lie_codegen.control.certificate_proofs import UNPROVED, proved_constants, status_of
 from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNumbers, overshoot_of
+from lie_codegen.control.certificate_record import Certificate, loop_state
 from lie_codegen.control.claims import check_constant, is_claimed
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.critical_points import CriticalPoints, found_points
-from lie_codegen.control.descent import comes_home
+from lie_codegen.control.critical_points import found_points
 from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples
+from lie_codegen.control.force_limits import read_limits
 from lie_codegen.control.invariance import invariance
 from lie_codegen.control.level_search import LevelSearch
 from lie_codegen.control.tracking_law import FEEDFORWARDS
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.plain_data import made_from
-from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import scipy
 
 _LAW = "lie_codegen.control.tracking_law:tracking_law"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Certificate(Saved):
-    """The constants of one loop on one level.
-
-    Attributes:
-        error, inertia, K_d, feedforward: the loop.
-        L: least critical value of phi other than at the reference, or the smaller constant that was claimed; (A1).
-        L_component: least value of a mountain pass out of the component of the reference; L or above it.
-        level: of W; every constant below holds on phi <= level.
-        speed: V, the largest |nu|_I of the transported reference velocity.
-        reach: largest entry of X_d and its inverse, where phi is not left-invariant; infinite where it is.
-        b_1, b_2: extreme values of phi/|d phi|^2 that were found.
-        b_1_proved, b_2_proved: bounds of these proved in interval arithmetic; NaN where there is no proof.
-        hessian, hessian_proved: h = sup |H - d phi . nabla|_I, and a proved bound of it.
-        transport, transport_proved: t = sup |nabla_Z X|_I over unit vectors, and a proved bound of it.
-        epsilon, rate, k: of the pointwise certificate: W(t) <= k W(0) exp(-rate t).
-        theorem_epsilon, theorem_rate, theorem_k: of Theorem 4.2, by suprema one by one; NaN for other feedforwards than levi_civita.
-        theorem_rate_proved: its rate with the four proved bounds; NaN where one is missing.
-        P, Q: (2, 2) its matrices there, P the upper one; P_low proves that W is positive.
-        limit_rate: of W by the linearisation about a reference at rest: twice that of its slowest mode.
-        critical_points: of phi.
-        status: how each of these is known.
-    """
-
-    error: ErrorFunction
-    inertia: Array
-    K_d: Array
-    feedforward: str
-    L: float
-    L_component: float
-    level: float
-    speed: float
-    reach: float
-    b_1: float
-    b_2: float
-    b_1_proved: float
-    b_2_proved: float
-    hessian: float
-    hessian_proved: float
-    transport: float
-    transport_proved: float
-    epsilon: float
-    rate: float
-    k: float
-    theorem_epsilon: float
-    theorem_rate: float
-    theorem_rate_proved: float
-    theorem_k: float
-    P: Array
-    P_low: Array
-    Q: Array
-    limit_rate: float
-    critical_points: CriticalPoints
-    status: str
-
-    @property
-    def group(self) -> MatrixGroup:
-        """The group."""
-        return self.error.group
-
-    def W(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> float:
-        """phi + |xi_e|_I^2/2 at a state.
-
-        Raises:
-            ShapeError, NotOnGroupError: an element or a velocity that is none.
-        """
-        return self._state(X, xi, X_d, xi_d).W
-
-    def inside(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> bool | None:
-        """Whether the certificate covers a loop that starts here, the reference staying within `speed` (and `reach`).
-
-        True: W <= level, and all conditions of Theorem 4.2 hold. False: W >= L, and no path downhill from X leads to the reference below a
-        mountain pass. None where nothing is known: between, for a faster or farther reference, or where critical points may be missing.
-
-        Raises:
-            ShapeError, NotOnGroupError: an element or a velocity that is none.
-        """
-        W, speed, far, E = self._state(X, xi, X_d, xi_d)
-        if speed > self.speed * (1 + 1e-9) + 1e-12 or far > self.reach * (1 + 1e-9):
-            return None
-        if self.critical_points.status not in ("complete", "degenerate", "cut"):
-            return None
-        if self.level >= W:
-            return True
-        if self.L > W or (self.L_component > W and comes_home(error_samples(self.error), E)):
-            return None
-        return False
-
-    def _state(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> _State:
-        return _state(self.error, self.inertia, X, xi, X_d, xi_d)
-
-
-class _State(NamedTuple):
-    """W, |nu|_I, the largest entry of X_d and X_d^-1, and a configuration as far from the identity as X is from X_d."""
-
-    W: float
-    speed: float
-    far: float
-    E: Array
-
-
-def _state(pair: ErrorFunction, inertia: Array, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> _State:
-    here, there = (admitted(pair.group, each, name).X for each, name in ((X, "X"), (X_d, "X_d")))
-    samples = error_samples(pair)
-    phi, _ = samples.first(here[None], there[None])
-    P, _ = samples.transport(here[None], there[None])
-    nu = P[0] @ _vector(xi_d, pair.group.dim, "xi_d")
-    error = _vector(xi, pair.group.dim, "xi") - nu
-    back = np.linalg.inv(there)
-    E = here @ back if pair.transport == "left" else back @ here
-    far = float(max(np.max(np.abs(there)), np.max(np.abs(back))))
-    return _State(float(phi[0] + error @ inertia @ error / 2), float(np.sqrt(nu @ inertia @ nu)), far, E)
-
-
-def _vector(value: ArrayLike, size: int, name: str) -> Array:
-    array = np.asarray(value, dtype=float)
-    if array.shape != (size,):
-        raise ShapeError(f"certificate: {name} has shape {array.shape}; give ({size},)")
-    return array
 
 
 def certificate(
@@ -169,6 +47,7 @@ def certificate(
     error: Any = None,
     gains: Mapping[str, Any] | None = None,
     feedforward: str = "levi_civita",
+    damping_limits: Any = None,
     law: Kernel | None = None,
     level: float | None = None,
     state: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike] | None = None,
@@ -185,7 +64,7 @@ def certificate(
     """The certificate of a tracking loop on a level of W.
 
     Args:
-        group, inertia, error, gains, feedforward: as `tracking_law`; or `law` alone, which has them in its definition.
+        group, inertia, error, gains, feedforward, damping_limits: as `tracking_law`; or `law` alone, which has them in its definition.
         level: of W, below L; half of L if not given. b_1 grows without bound as it nears L.
         state: (X, xi, X_d, xi_d) instead of a level: the level is W there.
         speed: the largest |nu|_I of the reference velocity, transported.
@@ -205,7 +84,8 @@ def certificate(
         if value is not None and value is not False:
             raise InputError(
                 f"certificate: {name} = {value!r}: a force that is clipped, held or delayed voids the proof, and no certificate covers such a "
-                "loop; lc.loop_margins gives its margins, and gains whose force stays below the limits need no clipping"
+                "loop; lc.loop_margins gives its margins, gains whose force stays below the limits need no clipping, and damping_limits= of "
+                "lc.tracking_law shortens the damping alone, which a certificate covers"
             )
     if law is not None:
         told = {
@@ -213,6 +93,7 @@ def certificate(
             "error": error,
             "gains": gains,
             "feedforward": None if feedforward == "levi_civita" else feedforward,
+            "damping_limits": damping_limits,
         }
         twice = [name for name, value in told.items() if value is not None]
         if twice:
@@ -220,7 +101,7 @@ def certificate(
                 f"certificate: {twice[0]} beside law: the law has its own, and with another the loop is not the one that is certified; "
                 "give the law alone, or everything but the law"
             )
-        inertia, error, gains, feedforward = _of_law(law, group)
+        inertia, error, gains, feedforward, damping_limits = _of_law(law, group)
     if inertia is None or error is None or gains is None:
         raise InputError("certificate needs inertia, error and gains, or a law made by lc.tracking_law")
     if feedforward not in FEEDFORWARDS:
@@ -243,7 +124,7 @@ def certificate(
     L = points.L if pair.constant is None else min(points.L, pair.constant)
     metric, samples = Metric(group, body), error_samples(pair)
     if state is not None:
-        now = _state(pair, body, *state)
+        now = loop_state(pair, body, *state)
         level, speed = now.W, max(speed, now.speed)
     level = _level(level, L, pair)
     moving, bound = not invariance(pair).left, float("inf")
@@ -253,12 +134,13 @@ def certificate(
     b_1, b_2 = quadratic_bounds(search, metric, stiffness)
     h, t = hessian_bound(search, metric), metric.turning()
     damping = scipy.linalg.eigh(K_d, body, eigvals_only=True)
-    theorem = TheoremNumbers(b_1, b_2, h, t, float(damping[0]), float(damping[-1]), float(speed))
+    share = _least_share(damping_limits, K_d, metric, level)
+    theorem = TheoremNumbers(b_1, b_2, h, t, share * float(damping[0]), float(damping[-1]), float(speed))
     if speed:
         search = LevelSearch(
             samples, body, level, float(speed), np.random.default_rng(seed), moving=moving, reach=bound
         )
-    pointwise = PointwiseRate(search, metric, K_d, feedforward, b_2)
+    pointwise = PointwiseRate(search, metric, K_d, feedforward, b_2, share)
     if epsilon is None:
         best = pointwise.best(overshoot)
     else:
@@ -275,11 +157,31 @@ def certificate(
         pair, body, K_d, feedforward, float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component), level,
         float(speed), bound, b_1, b_2, proved[0], proved[1], h, proved[2], t, proved[3], best.epsilon, best.rate, best.k, stated.epsilon,
         stated.rate, sure, stated.k, theorem.P(stated.epsilon), theorem.P(stated.epsilon, -1.0), theorem.Q(stated.epsilon),
-        float(-2 * np.max(slowest.real)), points, status_of(pair, points, proved, len(search.places.X)),
+        share, _largest_slopes(search), float(-2 * np.max(slowest.real)), points, status_of(pair, points, proved, len(search.places.X)),
     )  # fmt: skip
 
 
-def _of_law(law: Kernel, group: MatrixGroup) -> tuple[Any, Any, Any, str]:
+def _least_share(limits: Any, K_d: Array, metric: Metric, level: float) -> float:
+    """The least s of f_D = -s K_d xi_e: |xi_e|_I^2/2 <= W <= level bounds each component of K_d xi_e by Cauchy-Schwarz."""
+    if limits is None:
+        return 1.0
+    bounds = np.array([float(x) for x in read_limits(limits, len(K_d), "damping_limits")])
+    wanted = np.sqrt(2 * level * np.diag(K_d @ metric.inverse @ K_d))
+    return float(min(1.0, np.min(bounds / wanted)))
+
+
+def _largest_slopes(search: LevelSearch) -> Array:
+    """(n,) largest |d phi_a| on the level."""
+
+    def component(a: int) -> float:
+        return search.extreme(
+            lambda places: np.abs(search.samples.first(places.X, places.X_d)[1][:, a]), starts=2, largest=True
+        )
+
+    return np.array([component(a) for a in range(search.n)])
+
+
+def _of_law(law: Kernel, group: MatrixGroup) -> tuple[Any, Any, Any, str, Any]:
     """What a tracking law was made from.
 
     Raises:
@@ -295,9 +197,10 @@ def _of_law(law: Kernel, group: MatrixGroup) -> tuple[Any, Any, Any, str]:
     given = {name: made_from(value) for name, value in definition["parameters"].items()}
     if given["group"] != group:
         raise InputError(f"certificate: the law is one of {given['group'].name}, not of {group.name}")
-    if given["tunable"] or "input" in (given["inertia"], *(v for v in given["gains"].values() if isinstance(v, str))):
+    numbers = (given["inertia"], given["damping_limits"], *given["gains"].values())
+    if given["tunable"] or "input" in [number for number in numbers if isinstance(number, str)]:
         raise InputError("certificate: the law's numbers are inputs: give inertia, error and gains instead")
-    return given["inertia"], given["error"], given["gains"], given["feedforward"]
+    return given["inertia"], given["error"], given["gains"], given["feedforward"], given["damping_limits"]
 
 
 def _level(level: float | None, L: float, pair: ErrorFunction) -> float:

@@ -8,6 +8,9 @@ Pointwise, z = (sqrt phi, xi_e), g = d phi/sqrt phi:  W = z^T P z,  dW/dt = -z^T
     C = I^-1 K_d - I^-1 N_nu - M_nu,   H_s = sym(H + I^-1 d phi . N_2),   M_nu e_b = [nu, e_b] - A_b nu,
 from I xi_e' = -d phi - K_d xi_e + N_nu xi_e + N_2(xi_e, xi_e); M_nu vanishes for the right transport, where E' = E hat(xi_e).
 
+Where the law shortens its damping, f_D = -s K_d xi_e with least <= s <= 1, K_d is s K_d in Q. Q is affine in s and its least eigenvalue relative
+to P concave, so the least over s is at an end: both are looked at. In the theorem's Q k_1 belongs to the least s, k_2 to s = 1.
+
     W_total(t) <= k W_total(0) exp(-lambda t),  k = (1 + c)/(1 - c),  c = eps/sqrt(2 b_2), as |eps d phi . xi_e| <= c W_total.
 """
 
@@ -114,11 +117,20 @@ def _peak(value: Callable[[float], float], high: float) -> float:
 class PointwiseRate:
     """lambda(eps) of one loop on one level."""
 
-    def __init__(self, search: LevelSearch, metric: Metric, K_d: Array, feedforward: str, b_2: float) -> None:
+    def __init__(
+        self, search: LevelSearch, metric: Metric, K_d: Array, feedforward: str, b_2: float, least: float = 1.0
+    ) -> None:
+        """`least`: the smallest share of the damping that the law ever gives."""
         self.search, self.metric, self.K_d, self.feedforward, self.b_2 = search, metric, K_d, feedforward, b_2
+        self.shares = (1.0,) if least == 1 else (least, 1.0)
         self.seeds = search.places[:0]
 
-    def matrices(self, epsilon: float, places: Places) -> tuple[Array, Array]:
+    def rates(self, epsilon: float, places: Places) -> Array:
+        """(N,) the least generalised eigenvalue at each place."""
+        each = [_least(*self.matrices(epsilon, places, share * self.K_d)) for share in self.shares]
+        return np.asarray(np.min(each, axis=0))
+
+    def matrices(self, epsilon: float, places: Places, K_d: Array) -> tuple[Array, Array]:
         """P and Q at the places, (N, n + 1, n + 1)."""
         metric, n = self.metric, self.search.n
         found = self.search.samples.at(places.X, places.X_d)
@@ -126,21 +138,19 @@ class PointwiseRate:
         raised = found.slope @ metric.inverse
         linear, quadratic = self._feedforward(places)
         H = found.hessian + np.einsum("abc,nc->nab", quadratic, raised)
-        C = metric.inverse @ self.K_d - metric.inverse @ linear - self._turned(places)
+        C = metric.inverse @ K_d - metric.inverse @ linear - self._turned(places)
         P, Q = np.zeros((2, len(g), n + 1, n + 1))
         P[:, 0, 0] = 1
         P[:, 0, 1:] = P[:, 1:, 0] = epsilon * g / 2
         P[:, 1:, 1:] = metric.I / 2
         Q[:, 0, 0] = epsilon * np.einsum("na,ab,nb->n", g, metric.inverse, g)
         Q[:, 0, 1:] = Q[:, 1:, 0] = epsilon * np.einsum("na,nab->nb", g, C) / 2
-        Q[:, 1:, 1:] = self.K_d - epsilon * (H + np.swapaxes(H, 1, 2)) / 2
+        Q[:, 1:, 1:] = K_d - epsilon * (H + np.swapaxes(H, 1, 2)) / 2
         return P, Q
 
     def at(self, epsilon: float, starts: int = 3) -> float:
         """The least rate at this eps over the level; places where it was least before are tried again."""
-        value, place = self.search.tracked(
-            lambda places: _least(*self.matrices(epsilon, places)), self.seeds[:2], starts
-        )
+        value, place = self.search.tracked(lambda places: self.rates(epsilon, places), self.seeds[:2], starts)
         self.seeds = place.before(self.seeds[:_KEPT])
         return value
 
@@ -171,7 +181,7 @@ class PointwiseRate:
         return Rate(best, rate, overshoot_of(best, self.b_2))
 
     def _least(self, epsilon: float, places: Places) -> float:
-        return float(np.min(_least(*self.matrices(epsilon, places))))
+        return float(np.min(self.rates(epsilon, places)))
 
     def _feedforward(self, places: Places) -> tuple[Array, Array]:
         """N_nu, (N, n, n) acting on xi_e, and N_2[a, b] = the part that is quadratic in xi_e, lowered, (n, n, n)."""

@@ -16,19 +16,18 @@ from typing import Any
 
 from lie_codegen.control.error_catalogue import gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
+from lie_codegen.control.force_limits import force_limits, saturated
 from lie_codegen.control.tracking_law import tracking_law
-from lie_codegen.errors import ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, matvec, minus, plus, scaled
 from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
 from lie_codegen.kernel.small_inverse import inverse
-from lie_codegen.on_demand import sympy as sp
 
 #: Inputs of a tracking law before its numbers.
 _TRACKING = 5
@@ -122,62 +121,3 @@ def _matrix_gain(gains: Mapping[str, Any], name: str, what: str, n: int) -> Para
 def _inverse(ops: Arithmetic, gain: Parameter, value: Any) -> Matrix:
     """Of a gain: exact where it is a number, else from the input's value at each call."""
     return inverse(ops, value) if gain.value is None else constant_matrix(ops, gain.value.inv())
-
-
-@kernel_factory()
-def with_limits(law: Kernel, limits: Any, name: str | None = None) -> Kernel:
-    """The same law with its first output, a force or velocity, clipped to +-limits component by component; "input" for an input.
-
-    Raises:
-        ShapeError: the first output is not a vector, or the limits have another length.
-        InputError: a limit that is not positive.
-    """
-    if len(law.outputs[0].shape) != 1:
-        raise ShapeError(f"{law.name}: the first output is not a vector, so it has no component limits")
-    bounds, count, sampler = force_limits(limits, law.outputs[0].shape[0]), len(law.inputs), law.sampler
-
-    def body(ops: Arithmetic, *arguments: Any) -> tuple[Any, ...]:
-        first, *others = law.evaluate(ops, *arguments[:count])
-        return saturated(ops, first, *values_of(ops, bounds, arguments[count:])), *others
-
-    return replace(
-        law,
-        name=name or law.name,
-        inputs=(*law.inputs, *input_ports(bounds)),
-        body=body,
-        formula=f"{law.formula}; clipped to +-limits",
-        sampler=None if sampler is None else lambda rng: (*sampler(rng), *sample_inputs(bounds, rng)),
-    )
-
-
-def force_limits(limits: Any, size: int) -> tuple[Parameter, ...]:
-    """Positive limits, one a component, as one parameter; () for none.
-
-    Raises:
-        ShapeError, InputError: another length; a limit that is not positive.
-    """
-    if limits is None:
-        return ()
-    port = Port("limits", (size,), description="largest magnitude of each component")
-    return (parameter(port, limits, lambda value, _: _limits(value, size)),)
-
-
-def _limits(limits: Any, size: int) -> list[sp.Expr]:
-    many = (isinstance(limits, Sequence) and not isinstance(limits, str)) or hasattr(limits, "tolist")
-    values = limits if many else [limits] * size
-    if len(values) != size:
-        raise ShapeError(f"{len(values)} limits for {size} components")
-    return [positive_number(value, f"limits[{i}]") for i, value in enumerate(values)]
-
-
-def saturated(ops: Arithmetic, vector: Sequence[Scalar], limits: Sequence[Scalar] | None = None) -> Vector:
-    """min(max(v, -limit), limit), component by component."""
-    if limits is None:
-        return list(vector)
-    result: Vector = []
-    for value, limit in zip(vector, limits, strict=True):
-        high = ops.constant(limit) if isinstance(limit, int) else limit
-        low = -high
-        clipped = ops.where(ops.less(high, value), high, value)
-        result.append(ops.where(ops.less(value, low), low, clipped))
-    return result

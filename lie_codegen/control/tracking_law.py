@@ -10,6 +10,9 @@ with the feedforward by name (all share dW/dt and give different trajectories):
     left         the same as basic; with nu = xi_d it is f_FF,l of section 5.4
     levi_civita  I (nabla_xi nu + nu')                   Theorem 4.2
 
+Where actuators are weak, `damping_limits` shortens f_D alone: f_D = -s K_d xi_e with the largest s <= 1 that keeps every component within its
+limit, so that dW/dt = -s <K_d xi_e, xi_e> and W still falls; to clip the whole force may make W rise.
+
 Bullo and Murray, CIT-CDS 97-003, sections 4 and 5.
 """
 
@@ -24,6 +27,7 @@ from lie_codegen.control.compatibility import check_compatibility
 from lie_codegen.control.error_catalogue import error_names, gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_inputs import input_parameters
+from lie_codegen.control.force_limits import force_limits, shortened
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -62,6 +66,7 @@ def tracking_law(
     error: Any,
     gains: Mapping[str, Any] | None = None,
     feedforward: str = "basic",
+    damping_limits: Any = None,
     tunable: bool = False,
     name: str = "tracking_law",
 ) -> Kernel:
@@ -76,6 +81,8 @@ def tracking_law(
             as `error_function` takes them, with the parameters among the gains.
         gains: K_d (dissipation) and what the error function needs: K_p, or K_1 and K_2, or its parameters.
         feedforward: "basic", "right", "left" or "levi_civita".
+        damping_limits: largest |f_D| of each component: a number, (n,), or "input"; None for none. The largest f_P on a level of W is
+            `lc.certificate(...).proportional`: gains for which the two and the feedforward stay within the actuators need no clipping.
         tunable: inertia and K_d are inputs, whether or not numbers are given; the error function is compiled in.
         name: C identifier of the kernel.
 
@@ -105,8 +112,10 @@ def tracking_law(
             lambda value, name: positive_matrix(value, group.dim, name),
             tunable=tunable,
         ),
+        *force_limits(damping_limits, group.dim, "damping_limits"),
         *input_parameters(pair),
     )
+    bounded = damping_limits is not None
     check_compatibility(pair)
     check_claims(pair)
     real, data = RealMatrices(group), WeiNormanData(group)
@@ -114,8 +123,9 @@ def tracking_law(
     def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any, *given: Any) -> tuple[Any, ...]:
         read = GroupMatrices(ops, real).read
         metric, K_d, *rest = values_of(ops, parameters, given)
+        limits = rest.pop(0) if bounded else None
         at = ErrorDerivatives(ops, pair, real, read(X), read(X_d), rest)
-        return _law(at, metric, K_d, feedforward, xi, xi_d, xi_d_dot)
+        return _law(at, metric, K_d, feedforward, xi, xi_d, xi_d_dot, limits)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         def vector() -> list[float]:
@@ -143,7 +153,8 @@ def tracking_law(
             Port("W_dot", (), "W", description="dW/dt = -<K_d xi_e, xi_e>"),
         ),
         body=body,
-        formula=f"f = -d_1 phi - K_d (xi - nu) + f_FF; error {pair.name}, feedforward {feedforward}",
+        formula=f"f = -d_1 phi - K_d (xi - nu) + f_FF; error {pair.name}, feedforward {feedforward}"
+        + ("; f_D within its limits" if bounded else ""),
         source="Bullo and Murray, CIT-CDS 97-003, (28), (29), Theorem 4.2",
         sampler=sampler,
     )
@@ -163,11 +174,14 @@ def _law(
     xi: Sequence[Scalar],
     xi_d: Sequence[Scalar],
     xi_d_dot: Sequence[Scalar],
+    limits: Sequence[Scalar] | None,
 ) -> tuple[Any, ...]:
     phi, slope = at.differential(1)
     nu, nu_dot, turned = at.transported_rates(xi, xi_d, xi_d_dot)
     xi_e = minus(xi, nu)
     damping = matvec(dissipation, xi_e)
+    if limits is not None:
+        damping = shortened(at.ops, damping, limits)
     forward = feedforward_force(at.ops, at.real, metric, feedforward, xi, nu, nu_dot, turned)
     force = plus(negative(slope), negative(damping), forward)
     energy = phi + dot(matvec(metric, xi_e), xi_e) / 2

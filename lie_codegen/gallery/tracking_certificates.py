@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.control.certificate import Certificate, certificate
+from lie_codegen.control.certificate import certificate
+from lie_codegen.control.certificate_record import Certificate
 from lie_codegen.control.closed_loop import closed_loop
 from lie_codegen.control.error_samples import random_elements
 from lie_codegen.control.hybrid_law import hybrid_law

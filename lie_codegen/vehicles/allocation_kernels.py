@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from lie_codegen.control.integral_law import force_limits, saturated
+from lie_codegen.control.force_limits import force_limits, saturated
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port

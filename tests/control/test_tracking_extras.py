@@ -14,7 +14,8 @@ from scipy.linalg import expm
 import lie_codegen as lc
 from lie_codegen.control.attitude_law import attitude_law
 from lie_codegen.control.closed_loop import closed_loop
-from lie_codegen.control.integral_law import integral_law, with_limits
+from lie_codegen.control.force_limits import with_limits
+from lie_codegen.control.integral_law import integral_law
 from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.errors import InputError, ShapeError

@@ -19,7 +19,7 @@ import pytest
 
 import lie_codegen as lc
 from lie_codegen.control.attitude_law import attitude_lyapunov
-from lie_codegen.control.integral_law import with_limits
+from lie_codegen.control.force_limits import with_limits
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.second_order_step import held_force_step, second_order_step
 from lie_codegen.kernel.arithmetic import FloatArithmetic
