@@ -71,7 +71,7 @@ class FreeRotation(Saved):
     @property
     def k(self) -> Array:
         """(...) modulus; 0 at pure spin and of symmetric bodies."""
-        return self.motion["k"]
+        return self.motion["k"] + 0.0  # the root of a negative zero is one
 
     @property
     def nutation_period(self) -> Array:
@@ -158,39 +158,51 @@ def rotation_about(principal: tuple[Array, Array, Array], X: ArrayLike, omega: A
     start, rate = _rotation(X), np.asarray(omega, dtype=float)
     if rate.ndim < 1 or rate.shape[-1] != 3:
         raise ShapeError(f"free_rotation: omega has shape {rate.shape}, expected (..., 3)")
-    if not np.all(np.isfinite(rate)):
+    if not np.isfinite(rate).all():
         raise NotFiniteError("free_rotation: omega holds NaN or infinity")
-    lead = np.broadcast_shapes(start.shape[:-2], rate.shape[:-1])
-    start, rate = np.broadcast_to(start, (*lead, 3, 3)).copy(), np.broadcast_to(rate, (*lead, 3)).copy()
+    if start.ndim == 2 and rate.ndim == 1:
+        start, rate = start.copy(), rate.copy()
+    else:
+        lead = np.broadcast_shapes(start.shape[:-2], rate.shape[:-1])
+        start, rate = np.broadcast_to(start, (*lead, 3, 3)).copy(), np.broadcast_to(rate, (*lead, 3)).copy()
     fixed = _fixed_axis(matrix, moments, rate)
+    if not fixed.any():
+        values = broadcast_call(_library()["prepare"], moments, axes, start, rate)
+        return FreeRotation(matrix, start, rate, _named(values), fixed)
     # where the formulas do not apply, a harmless motion stands in: pure spin about the largest moment of another body
     harmless = np.where(fixed[..., None], axes[:, 2], rate)
     stand_in = moments if moments[2] - moments[0] > SPHERE * moments[2] else np.array([1.0, 1.2, 1.4])
-    values = broadcast_call(_library()["prepare"], stand_in, axes, start, harmless)
-    motion = {port.name: np.asarray(value) for port, value in zip(MOTION, values, strict=True)}
+    motion = _named(broadcast_call(_library()["prepare"], stand_in, axes, start, harmless))
     speed = np.linalg.norm(rate, axis=-1)
     for name, value in (("k", 0.0), ("Lambda", 0.0), ("m", speed)):
         motion[name] = np.where(fixed, value, motion[name])[()]
     return FreeRotation(matrix, start, rate, motion, fixed)
 
 
+def _named(values: tuple[Array, ...]) -> dict[str, Array]:
+    return {port.name: np.asarray(value) for port, value in zip(MOTION, values, strict=True)}
+
+
 def _fixed_axis(J: Array, moments: Array, omega: Array) -> NDArray[np.bool_]:
     """Where the motion is a rotation about a fixed axis outside of the formulas; refuses what has no period."""
-    momentum = omega @ J
-    if moments[2] - moments[0] <= SPHERE * moments[2]:
+    low, middle, high = moments.tolist()
+    if high - low <= SPHERE * high:
         return np.ones(omega.shape[:-1], dtype=bool)
-    size = np.linalg.norm(omega, axis=-1) * np.linalg.norm(momentum, axis=-1)
+    # a single motion is judged in Python's numbers, a batch in arrays: the formulas are the same
+    a, b, c = omega.tolist() if omega.ndim == 1 else np.moveaxis(omega, -1, 0)
+    p, q, r = (row[0] * a + row[1] * b + row[2] * c for row in J.tolist())
+    speed, square, twice = a * a + b * b + c * c, p * p + q * q + r * r, a * p + b * q + c * r
+    size = np.sqrt(speed) * np.sqrt(square)
+    across = np.sqrt((b * r - c * q) ** 2 + (c * p - a * r) ** 2 + (a * q - b * p) ** 2)
     rest = size == 0
-    with np.errstate(invalid="ignore", divide="ignore"):
-        across = np.linalg.norm(np.cross(omega, momentum), axis=-1) / size
-        near = np.abs(np.sum(momentum**2, axis=-1) / np.sum(omega * momentum, axis=-1) / moments[1] - 1) < _SEPARATRIX
-    pure = near & (across < _PURE)
+    near = ~rest & (np.abs(square - middle * twice) < _SEPARATRIX * middle * twice)
+    pure = near & (across < _PURE * size)
     if np.any(near & ~pure):
         raise InputError(
             "free_rotation: the motion is on the separatrix (L^2 / 2T is the middle moment of inertia to 1e-9): its period is "
             "infinite; change omega a little"
         )
-    if np.any(pure) and moments[1] - moments[0] > SPHERE * moments[2] and moments[2] - moments[1] > SPHERE * moments[2]:
+    if np.any(pure) and middle - low > SPHERE * high and high - middle > SPHERE * high:
         warn_caller(
             "free_rotation: pure spin about the middle axis is unstable; the steady rotation is returned, which no real body keeps",
             AssumptionWarning,
@@ -202,13 +214,20 @@ def _rotation(X: ArrayLike) -> Array:
     start = np.asarray(X, dtype=float)
     if start.ndim < 2 or start.shape[-2:] != (3, 3):
         raise ShapeError(f"X has shape {start.shape}, expected (..., 3, 3)")
-    defect = np.abs(np.swapaxes(start, -1, -2) @ start - np.eye(3)).max() if np.all(np.isfinite(start)) else np.inf
-    if not defect <= _ROTATION or np.any(np.linalg.det(start) < 0):
+    finite = np.isfinite(start).all()
+    defect = np.abs(np.swapaxes(start, -1, -2) @ start - np.eye(3)).max() if finite else np.inf
+    if not defect <= _ROTATION or np.any(_determinant(start) < 0):
         raise NotOnGroupError(f"X is no rotation: X^T X differs from 1 by {defect:.3g}, or det X < 0")
     if defect < 1e-13:
         return start
     u, _, v = np.linalg.svd(start)
     return np.asarray(u @ v)
+
+
+def _determinant(X: Array) -> Any:
+    """(...) by the rule of Sarrus."""
+    (a, b, c), (d, e, f), (g, h, i) = X.tolist() if X.ndim == 2 else np.moveaxis(X, (-2, -1), (0, 1))
+    return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
 @lru_cache(maxsize=1)

@@ -45,4 +45,4 @@ def principal_axes(J: Any) -> tuple[Array, Array, Array]:
         raise InputError(f"inertia is not positive: its principal moments are {moments.tolist()}")
     if moments[2] > (moments[0] + moments[1]) * (1 + _TRIANGLE):
         raise InputError(f"no body has the principal moments {moments.tolist()}: one is above the sum of the other two")
-    return matrix, moments, axes
+    return matrix, moments, np.ascontiguousarray(axes)

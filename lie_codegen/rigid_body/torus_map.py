@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 
 NODES = 24
+_ORDERS = np.fft.fftfreq(NODES, 1 / NODES)
+_N1, _N2 = _ORDERS[:, None], _ORDERS[None, :]
 #: Divisors below this part of the smaller frequency are dropped, and listed.
 SMALLEST_DIVISOR = 0.02
 #: Resonances looked for: |n1| of the phase, |n2| of the precession.
@@ -38,11 +40,9 @@ class TorusSeries:
     def correction(self, phi: float, alpha: float) -> Array:
         """W (4,) at a point, osculating = mean + W."""
         divisor, small = _divisors(self.rate, self.m)
-        n = np.fft.fftfreq(NODES, 1 / NODES)
-        n1, n2 = n[:, None], n[None, :]
-        kept = ~small & (np.abs(n1) < NODES / 2) & (np.abs(n2) < NODES / 2)
+        kept = ~small & (np.abs(_N1) < NODES / 2) & (np.abs(_N2) < NODES / 2)
         factor = np.zeros_like(divisor, dtype=complex)
-        factor[kept] = np.exp(1j * (2 * np.pi * n1 * phi + n2 * alpha))[kept] / (1j * divisor[kept])
+        factor[kept] = np.exp(1j * (2 * np.pi * _N1 * phi + _N2 * alpha))[kept] / (1j * divisor[kept])
         return np.asarray(np.real(np.einsum("ij,ijk->k", factor, self.waves)))
 
     def harmonic(self, n1: int, n2: int) -> float:
@@ -65,14 +65,12 @@ def torus_series(sample: Callable[[Array, Array], tuple[Array, Array]], rate: fl
 def small_divisors(rate: float, m: float) -> list[tuple[int, int]]:
     """The (n1, n2) that the periodic part leaves out."""
     _, small = _divisors(rate, m)
-    n = np.fft.fftfreq(NODES, 1 / NODES)
-    return [(int(n[i]), int(n[j])) for i, j in zip(*np.nonzero(small), strict=True) if i or j]
+    return [(int(_ORDERS[i]), int(_ORDERS[j])) for i, j in zip(*small.nonzero(), strict=True) if i or j]
 
 
 def _divisors(rate: float, m: float) -> tuple[Array, NDArray[np.bool_]]:
     """n1 2 pi Lambda + n2 m, and where it is too small to divide by, (0, 0) among them."""
-    n = np.fft.fftfreq(NODES, 1 / NODES)
-    divisor = 2 * np.pi * rate * n[:, None] + m * n[None, :]
+    divisor = 2 * np.pi * rate * _N1 + m * _N2
     return divisor, np.abs(divisor) < SMALLEST_DIVISOR * min(2 * np.pi * abs(rate), abs(m))
 
 

@@ -222,7 +222,7 @@ def _twin(model: TorqueModel, values: Array) -> Array:
     C, L, r, k, rate, c, moduli = motion_of(ops, H, D, inertia.tolist())
     least = 32 if model.has_smooth or k >= 0.7 else 16 if k >= 0.2 else 8
     count = int(values[-1]) or (least if k < 0.95 else 64 if k < 0.999 else 96)
-    total, inward = np.zeros(5), paper.T
+    total, inward = np.zeros(4), paper.T
     weights = 2 * (inertia - inertia[2])
     for j in range(count):
         direction, A = (np.array(each) for each in point_of(ops, r, moduli, j / count))
@@ -230,7 +230,7 @@ def _twin(model: TorqueModel, values: Array) -> Array:
 
         def add(alpha: float, N: Array, weight: float, A: Array = A, w: Array = w, total: Array = total) -> None:
             X = np.array(C) @ np.array(about_third(ops, alpha, A.tolist()))
-            total[:] += weight / count * np.concatenate([X @ N, [weights @ (w * N), w @ N]])
+            total[:] += weight / count * np.append(X @ N, weights @ (w * N))
 
         if model.has_smooth:
             for i in range(model.turns):
@@ -242,14 +242,15 @@ def _twin(model: TorqueModel, values: Array) -> Array:
             n, centre, d = A @ inward @ numbers[:3], A @ inward @ numbers[3:6], np.array(C).T @ e[place : place + 3]
             first, second = _lit_means(n[2] * d[2], complex(n[0] * d[0] + n[1] * d[1], n[0] * d[1] - n[1] * d[0]))
             pressure, specular, diffuse = numbers[6:]
-            arm, push, drive = np.cross(centre, n), A @ w, A @ (weights * w)
+            arm, drive = np.cross(centre, n), A @ (weights * w)
             moved = (1 - specular) * np.cross(first @ centre, d) + (
                 2 * specular * second + 2 / 3 * diffuse * first
             ) @ arm
             straight = 2 * specular * second[2, 2] + 2 / 3 * diffuse * first[2, 2]
-            powers = [(1 - specular) * d @ first @ np.cross(v, centre) + straight * v @ arm for v in (drive, push)]
-            total -= pressure / count * np.concatenate([np.array(C) @ moved, powers])
-    return np.concatenate([total, [k, rate, L, r[2], c]])
+            slope = (1 - specular) * d @ first @ np.cross(drive, centre) + straight * drive @ arm
+            total -= pressure / count * np.append(np.array(C) @ moved, slope)
+    power = (2 * np.dot(H, total[:3]) - total[3]) / (2 * inertia[2])  # D = H.H - 2 I3 T
+    return np.concatenate([total, [power, k, rate, L, r[2], c]])
 
 
 def _lit_means(level: float, wave: complex) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ def broadcast_call(function: Compiled[Any], *arguments: ArrayLike) -> tuple[Arra
     arrays, leading = [], []
     for port, value in zip(function.inputs, arguments, strict=True):
         try:
-            array = np.asarray(value, dtype=np.float64)
+            array = np.asarray(value, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise ShapeError(f"{function.name}: {port.name} is not an array of real numbers") from error
         cut = array.ndim - len(port.shape)
@@ -32,6 +32,12 @@ def broadcast_call(function: Compiled[Any], *arguments: ArrayLike) -> tuple[Arra
             raise NotFiniteError(f"{function.name}: {port.name} holds NaN or infinity")
         arrays.append(array)
         leading.append(array.shape[:cut])
+    if not any(leading):  # one point: a call, with none of the work of a batch
+        single: Any = function(*arrays)
+        single = (single,) if len(function.outputs) == 1 else single
+        return tuple(
+            np.asarray(r, dtype=np.float64).reshape(p.shape)[()] for r, p in zip(single, function.outputs, strict=True)
+        )
     try:
         batch = np.broadcast_shapes(*leading)
     except ValueError as error:

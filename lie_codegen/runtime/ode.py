@@ -73,7 +73,7 @@ class Field:
         self.places = (names.index(state), names.index(time) if time in names else -1)
         self.inputs = [
             np.zeros(port.shape) if number in self.places
-            else np.array(np.broadcast_to(np.asarray(given.pop(port.name), dtype=float), port.shape), order="C")
+            else _filled(given.pop(port.name), port.shape)
             for number, port in enumerate(rate.inputs)
         ]  # fmt: skip
         if given:
@@ -260,6 +260,12 @@ def fixed_steps(rate: Field, start: ArrayLike, t0: float, h: float, spans: int, 
 def _is_kernel(rate: Any) -> TypeGuard[Compiled[Any]]:
     """Whether it is a compiled kernel, behind the extension type or not."""
     return hasattr(rate, "signature") and hasattr(rate, "backend")
+
+
+def _filled(value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """A copy of its own, in C order, of a number or an array as one of a shape."""
+    array = np.array(value, dtype=float, order="C")
+    return array if array.shape == shape else np.array(np.broadcast_to(array, shape), order="C")
 
 
 def _only_python(*fields: Field | None) -> bool:
