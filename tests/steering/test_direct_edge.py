@@ -49,3 +49,29 @@ def test_beyond_the_edge_nothing_is_found() -> None:
     X[0, 2] = 1.0
     with pytest.raises(lc.errors.SteeringError, match="proves nothing"):
         lc.steer("se2", X, ("omega",), 3.0, drift=(0, 1, 0), bounds=1, rounds=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "control", "drift", "word", "lengths"),
+    [
+        ("se2", "omega", (0, 1, 0), (0, -1), (3.15643284, 1.84356716)),
+        ("se2", "omega", (0, 1, 0), (1, 0, 1), (1.8, 1.96, 1.24)),
+        ("se2", "omega", (0, 1, 0), (1, 0, -1), (2.4, 2.55, 0.05)),
+        ("se2", "omega", (0, 1, 0), (0, 1), (0.049, 4.951)),
+        ("so3", "w1", (0, 0, 1), (0, 1, 0), (0.9, 2.57, 1.53)),
+    ],
+)
+def test_shortest_ways_with_straight_arcs_are_reached_in_just_their_time(
+    name: str, control: str, drift: tuple[float, ...], word: tuple[int, ...], lengths: tuple[float, ...]
+) -> None:
+    """On a straight arc the end changes with the square of what the control does: equal pieces come near and no nearer."""
+    group = lc.group(name)
+    column = np.eye(3)[group.labels.index(control)]
+    X = np.eye(3)
+    for u, length in zip(word, lengths, strict=True):
+        X = X @ expm(group.hat(length * (np.array(drift) + u * column)))
+    plan = lc.steer(group, X, (control,), float(np.sum(lengths)), drift=drift, bounds=1)
+    assert plan.error < 1e-8
+    turned = sum(length for u, length in zip(word, lengths, strict=True) if u)
+    assert plan.cost <= turned * (1 + 1e-6)
+    assert np.max(np.abs(plan.inputs(np.linspace(0, plan.duration, 501)))) <= 1 + 1e-9

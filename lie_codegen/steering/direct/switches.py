@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -24,9 +25,15 @@ from lie_codegen.steering.direct.programme import Programme
 _ITERATIONS = 80
 #: Neighbours whose controls differ by less, relative to the bounds, are one arc.
 _BLUR = 0.02
+#: The same, for arcs whose controls are then held at a bound or zero; and how near to it they are for that.
+_COARSE, _SNAP = (0.3, 0.05), 0.15
+#: Words of at most that many arcs, of that many of the nearest lanes, with at most that many controls, are tried with one more arc anywhere.
+_FEW, _WIDENED, _CORNERED = 8, 3, 2
 _THERE = 1e-10
 #: Arcs below that part of the time are left out.
 _BRIEF = 2e-3
+#: Of an arc that is put in between others, at first.
+_NEW = 0.01
 
 
 def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown, int] | None:
@@ -37,14 +44,25 @@ def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown,
     bounded = np.all(np.isfinite(task.low)) and np.all(np.isfinite(task.high))
     if not task.system.steady or not bounded or any(task.free_slots):
         return None
-    for u, variant in near:
+    for number, (u, variant) in enumerate(near):
         bang = np.where(u < (task.low + task.high) / 2, task.low, task.high)
-        for arcs in (_arcs(task, u, _BLUR), _arcs(task, bang, _BLUR)):
-            durations, controls = _solved(task, *arcs, variant)
+        tries: list[tuple[Array, Array, Array | None]] = [
+            (*_arcs(task, u, _BLUR), None),
+            (*_arcs(task, bang, _BLUR), None),
+        ]
+        for alike in _COARSE:
+            durations, means = _arcs(task, u, alike)
+            letters, held = _letters(task, means, durations < 1.5 * task.duration / len(u))
+            tries.append((durations, letters, ~held))
+            if number < _WIDENED and len(letters) <= _FEW and task.controls <= _CORNERED:
+                tries += _with_one_more(task, durations, letters, held)
+        for s, v, moving in tries:
+            durations, controls = _solved(task, s, v, moving, variant)
             # the piece in which a switch was shrinks without end: the steps get on when it is gone
             long = durations > _BRIEF * task.duration
             if not np.all(long) and np.any(long):
-                durations, controls = _solved(task, durations[long], controls[long], variant)
+                rest = None if moving is None else moving[long]
+                durations, controls = _solved(task, durations[long], controls[long], rest, variant)
             flown = _flown(task, durations, controls, variant)
             if flown.miss <= _THERE * max(1.0, float(np.max(np.abs(task.end.values)))):
                 return flown, variant
@@ -66,6 +84,46 @@ def _arcs(task: Manoeuvre, u: Array, alike: float) -> tuple[Array, Array]:
     return np.array(durations), np.array(controls)
 
 
+def _letters(task: Manoeuvre, means: Array, brief: Array) -> tuple[Array, Array]:
+    """The controls (K, m) of arcs, those near a bound or zero moved there, and which were moved; arcs as brief as a piece are all
+    moved to what is nearest, for their mean is that of two arcs.
+
+    On a singular arc of a shortest way what its control does is of second order: with the control free the steps crawl, with the
+    durations alone they arrive.
+    """
+    choices = _choices(task)
+    far = np.abs(means - choices[:, None])
+    nearest = np.argmin(far, axis=0)
+    letters = np.take_along_axis(choices, nearest, axis=0)
+    held = (np.min(far, axis=0) <= _SNAP * (task.high - task.low)) | brief[:, None]
+    return np.where(held, letters, means), held
+
+
+def _choices(task: Manoeuvre) -> Array:
+    """(3, m): what controls are on arcs of shortest ways, mostly."""
+    return np.array([np.clip(0.0, task.low, task.high), task.low, task.high])
+
+
+def _with_one_more(
+    task: Manoeuvre, durations: Array, letters: Array, held: Array
+) -> list[tuple[Array, Array, Array | None]]:
+    """The arcs with one more at every place, each control at a bound or zero: an arc shorter than a piece is lost in the mean of that piece."""
+    found: list[tuple[Array, Array, Array | None]] = []
+    for place in range(len(letters) + 1):
+        beside = letters[max(0, place - 1) : place + 1]
+        for corner in product(*_choices(task).T):
+            if any(np.array_equal(corner, letter) for letter in beside):
+                continue
+            found.append(
+                (
+                    np.insert(durations, place, _NEW * task.duration),
+                    np.insert(letters, place, corner, axis=0),
+                    np.insert(~held, place, False, axis=0),
+                )
+            )
+    return found
+
+
 def _programme(task: Manoeuvre, arcs: int) -> Programme:
     """Exponentials of s a + sum_i w_i b_i, one an arc, with m + 1 coefficients each."""
     system, m, now = task.system, task.controls, np.zeros(1)
@@ -76,8 +134,8 @@ def _programme(task: Manoeuvre, arcs: int) -> Programme:
     return programme_of(wide, table, np.arange(arcs), np.tile([1.0, 0.0], (arcs, 1)), np.ones(arcs))
 
 
-def _solved(task: Manoeuvre, s: Array, u: Array, variant: int) -> tuple[Array, Array]:
-    """Durations (K,) and controls (K, m) that end nearest to the goal and add up to the time there is."""
+def _solved(task: Manoeuvre, s: Array, u: Array, moving: Array | None, variant: int) -> tuple[Array, Array]:
+    """Durations (K,) and controls (K, m), those `moving` or all, that end nearest to the goal and add up to the time there is."""
     m, arcs = task.controls, len(s)
     programme, goal = _programme(task, arcs), task.goal(np.array([variant]))
 
@@ -91,10 +149,13 @@ def _solved(task: Manoeuvre, s: Array, u: Array, variant: int) -> tuple[Array, A
         clock = np.concatenate([np.full(arcs, 1 / task.duration), np.zeros(arcs * m)])
         return np.append(r[0], np.sum(s) / task.duration - 1), np.vstack([np.hstack([by_s, by_u]), clock])
 
-    low = np.concatenate([np.zeros(arcs), np.tile(task.low, arcs)])
-    high = np.concatenate([np.full(arcs, task.duration), np.tile(task.high, arcs)])
+    lowest, highest = np.tile(task.low, (arcs, 1)), np.tile(task.high, (arcs, 1))
+    if moving is not None:
+        lowest, highest = np.where(moving, lowest, u), np.where(moving, highest, u)
+    low = np.concatenate([np.zeros(arcs), lowest.ravel()])
+    high = np.concatenate([np.full(arcs, task.duration), highest.ravel()])
     # a step in s counts in units of the time there is, one in u in units of the bounds
-    unit = np.concatenate([np.full(arcs, task.duration), np.tile(task.high - task.low, arcs)]) ** 2
+    unit = np.concatenate([np.full(arcs, task.duration), (highest - lowest).ravel()]) ** 2
     x, damped = np.concatenate([s, u.ravel()]), 1e-3
     r, J = equations(x)
     for _ in range(_ITERATIONS):
