@@ -43,7 +43,7 @@ from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, s
 from lie_codegen.on_demand import sympy as sp
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AdaptiveLaw(Kernel):
     """(X, xi, X_d, xi_d, xi_d_dot, a) -> (force, a_dot, phi).
 

@@ -58,7 +58,7 @@ from lie_codegen.on_demand import scipy
 _DISTINCT = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HybridLaw(Kernel):
     """(X, xi, X_d, xi_d, xi_d_dot, q) -> (force, q_next), with the numbers of its jump.
 

@@ -179,7 +179,7 @@ def called(
     if law.directions and isinstance(plant, GroupPlant):
         if seen is None:
             inverse = plant.inverse(ops, X) if E_inverse is None else E_inverse
-            seen = seen_directions(ops, inverse, law.directions)
+            seen = seen_directions(ops, plant.group, inverse, law.directions)
         y = next(each.port for each in law.ports if each.kind == "direction")
         given["direction"] = seen if len(y.shape) == 2 else seen[0]
     values = law.values(ops, given)
@@ -268,7 +268,7 @@ def _seen(ops: Arithmetic, loop: Loop, X: Any, noise: Vector | None) -> Any:
     directions = loop.directions
     if not directions or not isinstance(loop.plant, GroupPlant) or (loop.by_error and noise is None):
         return None
-    rows = seen_directions(ops, loop.plant.inverse(ops, X), directions)
+    rows = seen_directions(ops, loop.plant.group, loop.plant.inverse(ops, X), directions)
     if noise is None:
         return rows
     found, place = [], 0

@@ -25,6 +25,9 @@ import numpy as np
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.groups.maps.matrices import GroupMatrices
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -214,8 +217,17 @@ def _directions(
     return tuple(map(tuple, exact))
 
 
-def seen_directions(ops: Arithmetic, inverse: Matrix, directions: Sequence[Sequence[Any]]) -> list[Vector]:
-    """X^-1 c, one row each, from the matrix X^-1; a c one entry shorter than the matrix is a direction: (c, 0)."""
+def seen_directions(
+    ops: Arithmetic, group: MatrixGroup, inverse: Matrix, directions: Sequence[Sequence[Any]]
+) -> list[Vector]:
+    """X^-1 c, one row each, from the matrix X^-1; a c one entry shorter than the matrix is a direction: (c, 0).
+
+    On a complex group the c are vectors of the algebra, and Ad_(X^-1) c is what is seen: on SU(2), R(X)^T c.
+    """
+    if group.is_complex:
+        matrices = GroupMatrices(ops, RealMatrices(group))
+        X = matrices.inverse(inverse)
+        return [matrices.Ad(inverse, X, [number(ops, entry) for entry in c]) for c in directions]
     size = len(inverse)
     full = [[number(ops, entry) for entry in c] + [0] * (size - len(c)) for c in directions]
     return [matvec(inverse, c)[: len(short)] for c, short in zip(full, directions, strict=True)]

@@ -5,6 +5,9 @@ Outputs y_i = X^-1 c_i: directions c = z (on SE(n) (z, 0)), landmarks c = (p, 1)
     f = sum k_i |X^ y_i - c_i|^2/2,   grad_a = sum k_i (A_a X^ y_i).(X^ y_i - c_i)
     X^' = X^ hat(u_y - b^ - k_P Ad_(X^^-1) grad),   b^' = k_I Ad_(X^)^T grad,   V' = -k_P |grad|^2,  V = f + |b - b^|^2/(2 k_I)
 
+On a complex group the vectors are those of the algebra, seen as y = Ad_(X^-1) c: on SU(2), whose elements are unit quaternions, R(X)^T c. Ad is a
+representation as X is, with A_a v = [e_a, v], and the same formulas hold; X and -X are not told apart, so X^ comes to one of the two.
+
 On SO(3) this is X^' = X^ hat(omega_y - b^ + k_P s), b^' = -k_I s with s = sum k_i y_i x y^_i, y^_i = X^^T z_i; the order in s is the sign error
 to expect. Without bias the path of X^ X^-1 does not depend on u. The step is X^ <- X^ exp(h (...)), which stays on the group.
 """
@@ -26,11 +29,12 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.guard import nan_off_group
-from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
+from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, real_rows, velocity_units
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matmul, matvec, minus, number, plus, scaled
@@ -43,12 +47,12 @@ from lie_codegen.on_demand import sympy as sp
 _RANK = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Observer(Kernel):
     """The step (X_hat, bias, u, y, h) -> (X_hat_next, bias_next), with what is known of it near rest at X = 1.
 
     Attributes:
-        basis: (n, d, d) the matrices A_a of its group.
+        basis: (n, d, d) the matrices A_a that act on the vectors: of its group, or ad_a where it is complex.
         vectors: (k, d) the c_i.
         weights: (k,) k_i; () for an input.
         k_p, k_i: gains; NaN for an input.
@@ -143,8 +147,8 @@ def observer(
     """(X_hat, bias, u, y, h) -> (X_hat_next, bias_next), y one row a vector: first the directions, then the points.
 
     Args:
-        group: SO(n) with directions, SE(n) with directions and points, or any real group with outputs.
-        directions: (k, n) inertial vectors z, taken as given: y = R^T z.
+        group: SO(n) with directions, SE(n) with directions and points, any real group with outputs, a complex one with directions.
+        directions: (k, n) inertial vectors z, taken as given: y = R^T z. On a complex group (k, dim) vectors of the algebra, y = Ad_(X^-1) z.
         points: (k, n) inertial positions p of landmarks: y = R^T (p - position), p as the body sees it.
         outputs: (k, d) vectors c of any group: y = X^-1 c.
         weights: (k,) k_i, positive; 1 if not given.
@@ -157,10 +161,13 @@ def observer(
         ShapeError, InputError: vectors or weights that do not fit; vectors that do not determine the state.
     """
     group = as_group(group, "observer")
-    if group.is_complex:
-        raise InputError(f"observer: {group.name} is complex; vectors that a body sees are real")
-    d = group.degree
-    rigid = all(not any(matrix[d - 1, :]) for matrix in group.exact_basis) and outputs is None
+    if group.is_complex and (points is not None or outputs is not None):
+        raise InputError(
+            f"observer: {group.name} is complex: what a body sees of it are vectors of the algebra, y = Ad_(X^-1) z; give directions"
+        )
+    acting = _acting(group)
+    d = acting.shape[1]
+    rigid = outputs is None and not np.any(acting[:, d - 1, :])
     seen = d - 1 if rigid else d
     vectors = _vectors(directions, points, outputs, d, rigid=rigid)
     count = len(vectors)
@@ -174,7 +181,7 @@ def observer(
         parameter(Port("k_i", (), "1/s^2", description="gain of the bias"), k_i, _not_negative),
     )
     floats = tuple(tuple(float(x) for x in c) for c in vectors)
-    rank, n = _rank(group, floats), group.dim
+    rank, n = _rank(acting, floats), group.dim
     if rank < n and not reduced:
         raise InputError(
             f"observer: {count} vector(s) determine {rank} of {n} components on {group.name}: "
@@ -191,7 +198,8 @@ def observer(
         X = matrices.read(X_hat)
         correction, rate = corrections(ops, real, X, y, [[number(ops, x) for x in c] for c in vectors], k, seen)
         velocity = minus(minus(u, bias), scaled(p, correction))
-        moved = matmul(X, exp_matrix(ops, derivation, scaled(h, velocity)))
+        turn = exp_matrix(ops, derivation, scaled(h, velocity))
+        moved = matrices.write(matmul(X, real_rows(turn) if group.is_complex else turn))
         return moved, list(bias) if is_zero(i_gain) else plus(bias, scaled(h * i_gain, rate))
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
@@ -216,7 +224,7 @@ def observer(
         formula="X^ <- X^ exp(h (u - b^ - k_P Ad_(X^^-1) grad)), b^ <- b^ + h k_I Ad_(X^)^T grad",
         source="gradient observer on a group; V' = -k_P |grad|^2",
         sampler=sampler,
-        basis=tuple(tuple(map(tuple, matrix)) for matrix in group.basis.tolist()),
+        basis=tuple(tuple(map(tuple, matrix)) for matrix in acting.tolist()),
         vectors=floats,
         weights=tuple(float(w) for w in parameters[0].value or ()),
         k_p=_known(parameters[1]),
@@ -237,19 +245,21 @@ def corrections(
 ) -> tuple[Vector, Vector]:
     """Ad_(X^-1) grad and Ad_X^T grad."""
     matrices, n = GroupMatrices(ops, real), real.group.dim
-    basis = [matrices.hat([int(a == b) for b in range(n)]) for a in range(n)]
+    units = [[int(a == b) for b in range(n)] for a in range(n)]
     grad: Vector = [0] * n
-    for c, row, weight in zip(vectors, y, weights, strict=True):
-        shown = [
-            *row[:seen],
-            *c[seen:],
-        ]  # on SE(n) the last entry, 0 of a direction and 1 of a point, is no measurement
-        v = matvec(X, shown)
-        off = scaled(weight, minus(v, c))
-        grad = plus(grad, [dot(matvec(A, v), off) for A in basis])
     inverse = matrices.inverse(X)
+    for c, row, weight in zip(vectors, y, weights, strict=True):
+        if real.group.is_complex:
+            v = matrices.Ad(X, inverse, row)
+            turned = [bracket(ops, real.group.algebra, unit, v) for unit in units]
+        else:
+            # On SE(n) the last entry, 0 of a direction and 1 of a point, is no measurement.
+            v = matvec(X, [*row[:seen], *c[seen:]])
+            turned = [matvec(matrices.hat(unit), v) for unit in units]
+        off = scaled(weight, minus(v, c))
+        grad = plus(grad, [dot(each, off) for each in turned])
     back = matrices.Ad(inverse, X, grad)
-    columns = [matrices.Ad(X, inverse, [int(a == b) for b in range(n)]) for a in range(n)]
+    columns = [matrices.Ad(X, inverse, unit) for unit in units]
     return back, [dot(column, grad) for column in columns]
 
 
@@ -299,8 +309,16 @@ def _weights(weights: Any, count: int) -> list[sp.Expr]:
     return [positive_number(w, f"weights[{i}]") for i, w in enumerate(values)]
 
 
-def _rank(group: MatrixGroup, vectors: Sequence[Sequence[float]]) -> int:
+def _acting(group: MatrixGroup) -> Array:
+    """(n, d, d) the A_a as they act on the vectors: the group's own matrices, or ad_a, (ad_a)_cb = c_ab^c, where these are complex."""
+    if not group.is_complex:
+        return np.asarray(group.basis)
+    constants = np.asarray(group.algebra.structure_constants, dtype=float)
+    return np.asarray(np.swapaxes(constants, 1, 2))
+
+
+def _rank(acting: Array, vectors: Sequence[Sequence[float]]) -> int:
     """Of {A_a c_i}: n where the outputs determine the state near any place."""
-    moved = np.einsum("aij,kj->aki", group.basis, np.array(vectors)).reshape(group.dim, -1)
+    moved = np.einsum("aij,kj->aki", acting, np.array(vectors)).reshape(len(acting), -1)
     values = np.linalg.svd(moved, compute_uv=False)
     return int(np.sum(values > _RANK * max(1e-300, values[0])))

@@ -67,7 +67,7 @@ class PointingOffset(float):
         return float(self)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OutputFeedback(Kernel):
     """(X_hat, y) -> (force, u_hat), with what one direction leaves undone.
 

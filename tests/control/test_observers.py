@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, logm
 
 import lie_codegen as lc
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.casadi_arithmetic import function_of
 
 SO3, ONE = lc.group("so3"), np.eye(3)
@@ -180,3 +180,54 @@ def test_inertia_of_mass_points() -> None:
     assert not lc.inertia_from_masses([1] * 8, cube).unique_axes
     with pytest.raises(InputError, match="one line"):
         lc.inertia_from_masses([1, 2], [[0, 0, 0], [1, 0, 0]])
+
+
+def test_on_a_complex_group_the_body_sees_vectors_of_the_algebra() -> None:
+    """SU(2) covers SO(3): with the same vectors its observer is that of the rotations, step by step."""
+    su2, so3 = lc.group("su2"), lc.group("so3")
+    options: dict[str, Any] = {
+        "directions": [[0, 0, 1], [0.6, 0, 0.8]],
+        "weights": [1, 0.5],
+        "k_p": 1.2,
+        "k_i": 0.3,
+    }
+    spin, turn = lc.observer(su2, **options), lc.observer(so3, **options)
+    np.testing.assert_allclose(spin.A, turn.A, atol=1e-15)
+    one, other = lc.build(spin).observer, lc.build(turn).observer
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        v, bias, u = rng.normal(size=(3, 3))
+        y = rng.normal(size=(2, 3))
+        U, R = (expm(np.einsum("a,aij->ij", v, group.basis)) for group in (su2, so3))
+        U, b = one(U, bias, u, y, 0.05)
+        R, c = other(R, bias, u, y, 0.05)
+        np.testing.assert_allclose(b, c, atol=1e-14)
+        # tr(U e_b U^+ e_a^+)/tr(e_a e_a^+): the matrix of Ad_U, which is the rotation
+        Ad = 2 * np.einsum("ij,bjk,lk,ail->ab", U, su2.basis, U.conj(), su2.basis.conj()).real
+        np.testing.assert_allclose(Ad, R, atol=1e-14)
+
+
+def test_a_loop_on_su2_with_an_observer_comes_home() -> None:
+    su2 = lc.group("su2")
+    law = lc.tracking_law(su2, inertia=[1, 2, 3], error="frobenius", gains={"K_p": 4, "K_d": 5})
+    watching = lc.observer(su2, directions=[[0, 0, 1], [0.6, 0, 0.8]], k_p=2)
+    run = lc.closed_loop(
+        su2,
+        inertia=[1, 2, 3],
+        law=law,
+        reference=lc.reference(su2, ["t/5", "sin(t)/3", "cos(t)/4"]),
+        observer=watching,
+        states={"X_hat": expm(np.einsum("a,aij->ij", [0.4, -0.3, 0.2], su2.basis))},
+        t=np.linspace(0, 20, 5),
+        sample=0.05,
+    )
+    assert run.outputs["W"][-1] < 1e-3 * run.outputs["W"][0]
+
+
+def test_vectors_of_complex_groups_are_refused_where_they_fit_not() -> None:
+    with pytest.raises(InputError, match="6 of 8 components"):
+        lc.observer("su3", directions=[[1, 2, 3, 4, 5, 6, 7, 9]])
+    with pytest.raises(InputError, match="vectors of the algebra"):
+        lc.observer("su2", points=[[1, 2, 3]])
+    with pytest.raises(ShapeError, match="give 8"):
+        lc.observer("su3", directions=[[1, 2, 3]])

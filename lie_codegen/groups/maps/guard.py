@@ -12,6 +12,7 @@ from lie_codegen.groups.maps.admission import NEAR_GROUP
 from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel
 
 
@@ -38,6 +39,9 @@ def kept_where(ops: Arithmetic, conditions: Iterable[Any], values: Any) -> Any:
     if isinstance(values, list | tuple):
         held = list(conditions)
         return type(values)(kept_where(ops, held, value) for value in values)
+    if isinstance(values, Complex):
+        held = list(conditions)
+        return Complex(kept_where(ops, held, values.re), kept_where(ops, held, values.im))
     kept: Scalar = values
     for condition in conditions:
         kept = ops.where(condition, kept, ops.constant(math.nan))
