@@ -11,6 +11,7 @@ import typer
 from lie_codegen import __version__
 from lie_codegen.cli import averages, bench, code, groups, motion, pages, studies
 from lie_codegen.cli.output import complain, emit
+from lie_codegen.codegen.numerics import NUMERICS_VERSION
 from lie_codegen.errors import InputError, LieCodegenError
 
 app = typer.Typer(
@@ -26,7 +27,8 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        emit(f"lie-codegen {__version__}", {"version": __version__}, False)
+        told = {"version": __version__, "numerics": NUMERICS_VERSION}
+        emit(f"lie-codegen {__version__}, numerics {NUMERICS_VERSION}", told, False)
         raise typer.Exit
 
 

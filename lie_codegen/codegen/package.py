@@ -10,6 +10,7 @@ from typing import Any
 
 from lie_codegen.codegen.lanes import lane_body, lanes_header
 from lie_codegen.codegen.library_sources import LibrarySources
+from lie_codegen.codegen.numerics import NUMERICS_VERSION
 from lie_codegen.codegen.opcodes import REALS, Target
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.codegen.tape import tape_of
@@ -141,7 +142,9 @@ def _check(namespace: str, kernels: Sequence[Kernel]) -> None:
 def _view(namespace: str, kernels: Sequence[Kernel], metadata: PackageMetadata, target: Target) -> PackageView:
     _check(namespace, kernels)
     tapes = [tape_of(kernel, target.type_name) for kernel in kernels]
-    return package_view(namespace, kernels, tapes, metadata, target)
+    said = f"Numerics version {NUMERICS_VERSION} of lie_codegen: the same number and definition, the same arithmetic."
+    told = replace(metadata, conventions=(*metadata.conventions, said))
+    return package_view(namespace, kernels, tapes, told, target)
 
 
 def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
@@ -199,6 +202,7 @@ def _manifest(
         "format": 1,
         "namespace": view.namespace,
         "version": view.version,
+        "numerics": NUMERICS_VERSION,
         **({"real": view.type_name} if view.type_name != "double" else {}),
         "functions": [_function(kernel, starts.get(kernel.symbol)) for kernel in kernels],
         "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},

@@ -10,7 +10,7 @@ from typing import Any
 from lie_codegen.gallery import derivative_errors as study
 from lie_codegen.gallery.leonard_style import plain
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, GREEN, RED
+from lie_codegen.pictures.style import BLUE, GREEN, RED, caption
 
 _COLOURS = {"lie_codegen": BLUE, "jaxlie": RED, "liecasadi": GREEN}
 _ORDERS = ("value", "first derivative", "second derivative")
@@ -89,5 +89,12 @@ def _draw(table: Table) -> Any:
         axes.set_xticks([_ZERO, 1e-8, 1e-6, 1e-4, 1e-2, 1], ["0", "1e-8", "1e-6", "1e-4", "0.01", "1"])
         axes.set_xticks([], minor=True)
     panels[0, 0].set_yticks([1e-16, 1e-8, 1, 1e8, 1e16], ["1e-16", "1e-8", "1", "1e8", "1e16"])
+    figure.suptitle("Accuracy near the identity, of values and of two derivatives")
+    absent = [library for library in _COLOURS if library not in table]
+    caption(
+        figure,
+        "Against 60 digits; crosses: no number came."
+        + (f" Not installed here, so not shown: {', '.join(absent)}." if absent else ""),
+    )
     panels[0, 0].legend(frameon=False, loc="upper right")
     return figure

@@ -16,6 +16,7 @@ from lie_codegen.groups.catalogue_load import group
 from lie_codegen.mechanics.mechanical_system import mechanical_system
 from lie_codegen.mechanics.vibrational_average import vibrational_average
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _J = np.array([[1.2, 0.1, -0.05], [0.1, 0.9, 0.07], [-0.05, 0.07, 0.6]])
@@ -46,7 +47,8 @@ def inverted_body(folder: Path, progress: Callable[[str], None] = lambda line: N
     axis = np.cross((0, 0, 1), up)
     upright = expm(-so3.hat(axis / np.linalg.norm(axis) * np.arccos(up[2])))
     start, t = upright @ expm(so3.hat((0.3, 0.2, 0.0))), np.linspace(0, 12, 600)
-    figure = new_figure(11, 4)
+    figure = new_figure(11, 4.6)
+    figure.suptitle("A rigid body upside down on a shaken pivot")
     axes: Any = figure.subplots(1, 2)
     axes[0].axhline(averaged, color="#c8442f", label="$\\sqrt{2 \\lambda_c}$, average of order 1")
     axes[0].plot(_EPS, true, "o-", color="#1f5aa6", label="Floquet")
@@ -62,7 +64,11 @@ def inverted_body(folder: Path, progress: Callable[[str], None] = lambda line: N
         mean = average.solve(z.X, z.xi, t, 0.02, tolerance=1e-8)
         axes[1].plot(t, np.arccos(np.clip(mean.advected @ up, -1, 1)), "--", color="black", lw=0.8)
         ends[str(beta)] = float(tilt[-1])
-    axes[1].set(title="tilt; dashed: average of order 3", xlabel="t [s]", ylabel="rad")
+    axes[1].set(title="tilt, $\\epsilon = 0.02$", xlabel="t [s]", ylabel="angle from the upright [rad]")
+    caption(
+        figure,
+        "Left: multipliers of the true system by Floquet, against the threshold of the average. Right: dashed, the average of order 3.",
+    )
     for each in axes:
         each.legend(frameon=False, fontsize=8)
     numbers = {

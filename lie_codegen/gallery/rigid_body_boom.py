@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, GREY, RED
+from lie_codegen.pictures.style import BLUE, GREY, RED, caption
 from lie_codegen.rigid_body.euler_average import euler_average
 from lie_codegen.rigid_body.euler_solutions import (
     explicit_inertia_change,
@@ -86,4 +86,7 @@ def rigid_body_boom(folder: Path, progress: Callable[[str], None] = lambda line:
     axes[2, 0].legend(loc="upper left")
     axes[2, 1].set_ylim(-0.85, 1.3)
     axes[2, 1].legend(loc="upper left")
+    caption(
+        figure, "The boom grows with $\\epsilon t$ until $k^2$ nears 1/2; (28) is integrated, (32) is its closed form."
+    )
     return save("rigid_body_boom", folder, figure, numbers)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import caption
 from lie_codegen.rigid_body.euler_average import euler_average
 from lie_codegen.rigid_body.euler_solutions import solve_actual, solve_averaged
 from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
@@ -43,7 +44,7 @@ def rigid_body_thruster(folder: Path, progress: Callable[[str], None] = lambda l
     }
     figure = new_figure(10, 8)
     axes: Any = figure.subplots(3, 1, sharex=True)
-    figure.suptitle("Thruster about the third axis from t = 0 (Coppola, Figure 2)", fontsize=13)
+    figure.suptitle("A thruster about the third axis from $t = 0$ (Coppola, Figure 2)")
     amplitudes = (ratios[0] * slow.k * slow.Omega, ratios[1] * slow.k * slow.Omega, slow.Omega)
     for n in range(3):
         axes[n].plot(before, free[:, n], color=_COLOURS[n], lw=0.9)
@@ -57,4 +58,8 @@ def rigid_body_thruster(folder: Path, progress: Callable[[str], None] = lambda l
         axes[n].set(ylabel=f"$\\omega_{n + 1}$ [rad/s]")
     axes[2].legend(frameon=False, loc="upper left")
     axes[2].set(xlabel="t [s]")
+    caption(
+        figure,
+        "Colours: the full equations, free before $t = 0$. Thick: averaged amplitudes, for the third axis its two bounds.",
+    )
     return save("rigid_body_thruster", folder, figure, numbers)

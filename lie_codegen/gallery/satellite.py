@@ -17,7 +17,7 @@ from lie_codegen.groups.build import build, generate
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.wei_norman.matrix import wei_norman
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import BLUE, GREY, RED
+from lie_codegen.pictures.style import BLUE, GREY, RED, caption
 from lie_codegen.steering.closed_form.four_phase import average, integrals
 from lie_codegen.steering.front import steer
 
@@ -65,16 +65,16 @@ def satellite(folder: Path, progress: Callable[[str], None] = lambda line: None)
 def _draw(plan: Any, best: Any, t: Any, g: Any, mean: Any) -> Any:
     figure = new_figure(11, 9)
     top, middle, bottom = figure.subplots(3, 2)
-    figure.suptitle("Two wheels, three axes: attitude by the area rule (TR 93-59, Figures 2 and 3)", fontsize=13)
+    figure.suptitle("Two wheels, three axes: attitude by the area rule (TR 93-59, Figures 2 and 3)")
     u, optimal = plan.u(t), best.u(t)
     for axes, column, name in zip(top, (0, 1), ("1", "2"), strict=True):
         axes.plot(t, u[:, column], color=BLUE, label="controls by the area rule")
         axes.plot(t, optimal[:, column], color=GREY, lw=1.2, label="controls of minimum energy")
-        axes.set(title=f"Figure 2: control $\\epsilon u_{name}$", ylabel="rad/s")
+        axes.set(title=f"Figure 2: control $\\epsilon u_{name}$", ylabel="rate [rad/s]")
     for axes, column, letter in ((middle[0], 0, "a"), (middle[1], 1, "b"), (bottom[1], 2, "d")):
         axes.plot(t, mean[:, column], color=BLUE, label="second-order average")
         axes.plot(t, g[:, column], "--", color=RED, label="actual motion")
-        axes.set(title=f"Figure 3({letter}): $g_{column + 1}$", ylabel="rad")
+        axes.set(title=f"Figure 3({letter}): $g_{column + 1}$", ylabel="angle [rad]")
     loop = integrals(plan, t)
     bottom[0].fill(loop[:, 0], loop[:, 1], color=BLUE, alpha=0.12)
     bottom[0].plot(loop[:, 0], loop[:, 1], color=BLUE)
@@ -82,6 +82,10 @@ def _draw(plan: Any, best: Any, t: Any, g: Any, mean: Any) -> Any:
         title="Figure 3(c): the loop whose area turns axis 3",
         xlabel="$\\epsilon\\tilde u_1$ [rad]",
         ylabel="$\\epsilon\\tilde u_2$ [rad]",
+    )
+    caption(
+        figure,
+        "Target: Wei-Norman coordinates (0.1, 0.05, $\\pi$/40) in 24 s, four phases; grey: the same attitude by least energy.",
     )
     shown = [handle for axes in (top[0], middle[0]) for handle in axes.get_legend_handles_labels()[0]]
     figure.legend(handles=shown, loc="outside lower center", ncols=4, frameon=False)

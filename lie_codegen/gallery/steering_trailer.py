@@ -93,7 +93,7 @@ def _figure(plan: Plan, t: Array, driven: dict[str, Array]) -> Any:
     figure.suptitle("A tractor with a trailer moved one metre sideways: the figure of eight of the Engel group")
     caption(
         figure,
-        "Black: the tractor; grey: the trailer's bar, at even times of the figure of eight. The vehicle is integrated by SciPy.",
+        "Thick: the tractor; thin: the trailer's bar, at even times of the figure of eight. The vehicle is integrated by SciPy.",
     )
     axes.set(title="paths of the trailer's axle", xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal", "datalim")

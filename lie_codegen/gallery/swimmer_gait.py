@@ -13,6 +13,7 @@ from lie_codegen.averaging.path_end import magnus_six
 from lie_codegen.averaging.shape_examples import example_connection
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import caption
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _WIDTH, _NODES, _STEPS, _PERIODS = 1.6, 61, 200, 6
@@ -29,15 +30,21 @@ def swimmer_gait(folder: Path, progress: Callable[[str], None] = lambda line: No
     heights = -framed.curvature(np.stack([r1, r2], axis=-1))[..., 0, 1, :]
     t = np.linspace(0, 2 * np.pi, _STEPS + 1)
     loop = best.r(t)
-    figure = new_figure(13, 4)
+    figure = new_figure(13, 4.8)
+    figure.suptitle("Three links in a viscous fluid: the gait of greatest displacement by effort")
     axes: Any = figure.subplots(1, 3)
+    names = {0: r"$\omega$", 1: "$v_x$"}
     for axis, component in zip(axes[:2], (1, 0), strict=True):
         height = heights[..., component]
         size = np.abs(height).max()
-        axis.contourf(r1, r2, height, 21, cmap="RdBu_r", vmin=-size, vmax=size)
+        drawn = axis.contourf(r1, r2, height, 21, cmap="RdBu_r", vmin=-size, vmax=size)
         axis.plot(loop[:, 0], loop[:, 1], color="black", lw=1.5)
-        axis.set(title=f"$-DA_{{12}}$, {swimmer.group.labels[component]}", xlabel="$r_1$ [rad]", ylabel="$r_2$ [rad]")
+        axis.set(
+            title=f"height function $-DA_{{12}}$ of {names[component]}", xlabel="$r_1$ [rad]", ylabel="$r_2$ [rad]"
+        )
         axis.set_aspect("equal")
+        unit = "m/rad$^2$" if component else "1/rad"
+        figure.colorbar(drawn, ax=axis, shrink=0.8, label=unit, format="%.2g")
 
     def velocity(times: Any) -> Any:
         rate = (best.r(times + 1e-6) - best.r(times - 1e-6)) / 2e-6
@@ -52,8 +59,12 @@ def swimmer_gait(folder: Path, progress: Callable[[str], None] = lambda line: No
     path = np.array(way)
     axes[2].plot(path[:, 0], path[:, 1], color="#1f5aa6")
     axes[2].plot(*path[::_STEPS].T, "o", color="#c8442f", ms=4)
-    axes[2].set(title=f"{_PERIODS} periods", xlabel="x [m]", ylabel="y [m]")
+    axes[2].set(title=f"path over {_PERIODS} periods", xlabel="x [m]", ylabel="y [m]")
     axes[2].set_aspect("equal")
+    caption(
+        figure,
+        "The curve is the gait on the shape space; what it encloses is, to second order, what it moves. Dots: ends of the periods.",
+    )
     circles = {}
     for radius in (0.8, 1.0, 1.2, 1.4):
         X = swimmer.displacement(PeriodicInput(["cos(t)", "sin(t)"]), amplitude=radius)

@@ -19,7 +19,7 @@ from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
-from lie_codegen.pictures.style import COLOURS
+from lie_codegen.pictures.style import COLOURS, caption
 
 _INERTIA = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 _GAINS = {"K_1": [8, 10, 12], "K_2": [6, 7, 8], "K_d": [6, 7, 8, 10, 11, 12]}
@@ -68,8 +68,11 @@ def tracking_rows(folder: Path, progress: Callable[[str], None] = quiet) -> Gall
         f"$10^{{{np.log10(_FLOOR[each]):.0f}}}$ {unit}"
         for each, unit in (("W", "J"), ("distance", "m"), ("angle", "degrees"))
     )
-    title = f"Row of Table 1: its errors of position and of attitude. Logarithmic axes, cut at {cut}: below, rounding is seen."
-    figure.legend(*shown[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, title=title)
+    caption(
+        figure,
+        f"Row of Table 1: its errors of position and of attitude. Logarithmic axes, cut at {cut}: below, rounding is seen.",
+    )
+    figure.legend(*shown[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return save("tracking_rows", folder, figure, numbers)
 
 

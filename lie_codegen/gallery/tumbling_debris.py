@@ -11,6 +11,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
+from lie_codegen.pictures.style import caption
 from lie_codegen.rigid_body.torques import Plates, plates, torque
 from lie_codegen.rigid_body.tumbling_average import TumblingAverage, tumbling_average
 
@@ -76,23 +77,29 @@ def tumbling_debris(folder: Path, progress: Callable[[str], None] = lambda line:
     }
     figure = new_figure(11, 8)
     axes: Any = figure.subplots(2, 2)
-    figure.suptitle("A debris object of 8 plates under sunlight, sixty days, 8,640 turns", fontsize=13)
+    figure.suptitle("A debris object of 8 plates under sunlight, sixty days, 8,640 turns")
     days = t / _DAY
     for i, name in enumerate("xyz"):
         axes[0, 0].plot(days, direct.H[:, i], color=_GREY, lw=3, alpha=0.6, label="direct" if i == 0 else None)
         axes[0, 0].plot(days, run.H[:, i], color=(_BLUE, _RED, _GREEN)[i], lw=1.2, label=f"averaged $H_{name}$")
-    axes[0, 0].set(title="(a) angular momentum [N m s]", xlabel="days")
+    axes[0, 0].set(title="(a) angular momentum in space", xlabel="t [days]", ylabel="$H$ [N m s]")
     axes[0, 1].plot(days, direct.dynamic_inertia, color=_GREY, lw=3, alpha=0.6, label="direct")
     axes[0, 1].plot(days, run.dynamic_inertia, color=_BLUE, lw=1.2, label="averaged")
-    axes[0, 1].set(title="(b) dynamic inertia $L^2/2T$ [kg m$^2$]", xlabel="days")
+    axes[0, 1].set(title="(b) dynamic inertia", xlabel="t [days]", ylabel="$L^2/2T$ [kg m$^2$]")
     axes[1, 0].semilogy(days[1:], paper[1:], color=_RED, lw=0.9, label="averaged from the osculating point")
     axes[1, 0].semilogy(days[1:], error[1:], color=_BLUE, lw=0.9, label="from the mean point, periodic part added")
-    axes[1, 0].set(title="(c) error of $H$ against the direct run, relative", xlabel="days")
+    axes[1, 0].set(title="(c) error of $H$ against the direct run", xlabel="t [days]", ylabel="relative error")
     cost = numbers["seconds"]
     axes[1, 1].barh(["averaged", "direct"], [cost["averaged"], cost["direct"]], color=[_BLUE, _GREY])
-    axes[1, 1].set(xscale="log", title=f"(d) seconds of one processor, whole calls: {cost['ratio']:.0f} times")
+    axes[1, 1].set(
+        xscale="log", xlabel="processor time [s]", title=f"(d) time of a whole call: {cost['ratio']:.0f} times"
+    )
     for axis in (axes[0, 0], axes[0, 1], axes[1, 0]):
         axis.legend(frameon=False, fontsize=8)
+    caption(
+        figure,
+        "Direct: the attitude turn by turn. Averaged: over the free motion, started at the mean point of that motion.",
+    )
     return save("tumbling_debris", folder, figure, numbers)
 
 
@@ -120,13 +127,13 @@ def tumbling_separatrix(folder: Path, progress: Callable[[str], None] = lambda l
     }  # fmt: skip
     figure = new_figure(11, 8)
     axes: Any = figure.subplots(2, 2)
-    figure.suptitle("Despun through the separatrix by eddy currents", fontsize=13)
-    panels: tuple[tuple[Any, Callable[[Any], Any], str], ...] = (
-        (axes[0, 0], lambda run: run.dynamic_inertia, "(a) dynamic inertia $L^2/2T$ [kg m$^2$]"),
-        (axes[0, 1], lambda run: np.linalg.norm(run.H, axis=1), "(b) $|H|$ [N m s]"),
-        (axes[1, 1], lambda run: run.H[:, 0], "(d) $H_x$ [N m s]: two continuations, and the truth"),
+    figure.suptitle("Despun through the separatrix by eddy currents")
+    panels: tuple[tuple[Any, Callable[[Any], Any], str, str], ...] = (
+        (axes[0, 0], lambda run: run.dynamic_inertia, "(a) dynamic inertia", "$L^2/2T$ [kg m$^2$]"),
+        (axes[0, 1], lambda run: np.linalg.norm(run.H, axis=1), "(b) size of the angular momentum", "$|H|$ [N m s]"),
+        (axes[1, 1], lambda run: run.H[:, 0], "(d) two continuations, and the truth", "$H_x$ [N m s]"),
     )
-    for axis, value, title in panels:
+    for axis, value, title, unit in panels:
         axis.plot(t, value(direct), color=_GREY, lw=3, alpha=0.6, label="direct")
         for run, colour, name in zip(after, (_RED, _GREEN), ("+", "-"), strict=True):
             late = run.t > before.event.t
@@ -140,13 +147,17 @@ def tumbling_separatrix(folder: Path, progress: Callable[[str], None] = lambda l
             )
         axis.plot(before.t, value(before), color=_BLUE, lw=1.3, label="averaged")
         axis.axvline(before.event.t, color="#444444", lw=0.7, ls=":")
-        axis.set(title=title, xlabel="t [s]")
+        axis.set(title=title, xlabel="t [s]", ylabel=unit)
         axis.legend(frameon=False, fontsize=8)
     axes[1, 1].set(xlim=(5000, 8000), ylim=(-0.41, -0.36))
     axes[1, 0].plot(before.t, before.k, color=_BLUE, label="averaged, long-axis mode")
     late = after[0].t > before.event.t
     axes[1, 0].plot(after[0].t[late], after[0].k[late], color=_RED, label="averaged, short-axis mode")
     axes[1, 0].axhline(0.999, color="#444444", lw=0.7, ls=":")
-    axes[1, 0].set(title="(c) modulus $k$; the event is at .999", xlabel="t [s]")
+    axes[1, 0].set(title="(c) modulus; the event is at 0.999", xlabel="t [s]", ylabel="$k$")
     axes[1, 0].legend(frameon=False, fontsize=8)
+    caption(
+        figure,
+        "At the separatrix the average has two continuations, by the phase at which it is crossed; dotted: the event.",
+    )
     return save("tumbling_separatrix", folder, figure, numbers)
