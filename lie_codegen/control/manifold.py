@@ -26,6 +26,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matvec, minus, plus, scaled
+from lie_codegen.kernel.parameter import refuse_input
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 
@@ -302,6 +303,8 @@ def manifold(
         raise InputError(f"manifold: the number of coordinates is 1, 2, ..., not {size!r}")
     n, q = int(size), symbols_of("q", int(size))
     names: dict[str, sp.Expr] = {symbol.name: symbol for symbol in q} | {"pi": sp.pi}
+    for key, value in (parameters or {}).items():
+        refuse_input(value, key, "the plant of a manifold is made of numbers; of laws on it they may be inputs")
     names |= {key: real_number(value, key) for key, value in (parameters or {}).items()}
     listed = [constraints] if isinstance(constraints, str) else list(constraints)
     c = tuple(read_formula(entry, names, f"constraints[{k}]") for k, entry in enumerate(listed))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import IncompatibleError, InputError
@@ -143,6 +144,8 @@ def test_an_inertia_that_is_singular_across_the_manifold() -> None:
 
 
 def test_refusals() -> None:
+    with pytest.raises(InputError, match='m cannot be "input"'):
+        lc.manifold(1, inertia=["m"], parameters={"m": "input"})
     Q = product()
     with pytest.raises(IncompatibleError, match="not compatible"):
         lc.manifold_law(Q, phi=f"5*(1 - {DOT})", transport=ONE, K_d=1)
@@ -160,3 +163,51 @@ def test_refusals() -> None:
         lc.reference(Q, ["cos(t)", "sin(t)", "t", "0", "0", "0"])
     with pytest.raises(InputError, match="is not on the manifold"):
         Q.loop_plant().starts([1, 1, 0, 0, 0, 0], None)
+
+
+def test_rotations_times_vectors_against_the_group_and_a_linear_equation() -> None:
+    """SO(3) x R^3 in R^12. The rotation is the loop of `lc.tracking_law` on so3, |R hat(w)|^2 = 2 |w|^2; the position's error is
+    that of 3 e'' = -3 e - 3 e'."""
+    q = [f"q{k}" for k in range(1, 13)]
+    R, R_d = (np.array([f"{letter}{k}" for k in range(1, 10)], dtype=object).reshape(3, 3) for letter in "qr")
+    constraints = [
+        " + ".join(f"{R[k, i]}*{R[k, j]}" for k in range(3)) + (" - 1" if i == j else "")
+        for i in range(3)
+        for j in range(i, 3)
+    ]
+    Q = lc.manifold(12, constraints=constraints, inertia=[2] * 9 + [3] * 3)
+    trace = " + ".join(f"{a}*{b}" for a, b in zip(R.ravel(), R_d.ravel(), strict=True))
+    far = " + ".join(f"({a} - r{a[1:]})^2" for a in q[9:])
+    T = [["0"] * 12 for _ in range(12)]
+    for i, j, k in np.ndindex(3, 3, 3):
+        T[3 * i + j][3 * k + j] = " + ".join(
+            f"{R[i, m]}*{R_d[k, m]}" for m in range(3)
+        )  # R R_d^T R_d', the transport xi_d of so3_left
+    for i in range(9, 12):
+        T[i][i] = "1"
+    law = lc.manifold_law(Q, phi=f"2*(3 - ({trace})) + 3/2*({far})", transport=T, K_d=3)
+    turning = ["cos(t)", "-sin(t)", "0", "sin(t)", "cos(t)", "0", "0", "0", "1"]
+    moving = lc.reference(Q, [*turning, "t/5", "sin(t)", "1"])
+    start = expm(lc.group("so3").hat([0.4, 0.3, -0.5]))
+    t, e = np.linspace(0, 6, 13), np.array([0.4, 0.3, -1.2])
+    run = lc.closed_loop(
+        Q, law=law, reference=moving, X0=[*np.ravel(start), *(e + [0, 0, 1])], xi0=np.zeros(12), t=t, tolerance=1e-9
+    )
+    alone = lc.closed_loop(
+        "so3",
+        inertia=4,
+        law=lc.tracking_law("so3", inertia=4, error="so3_left", gains={"K_p": 4, "K_d": 6}, feedforward="levi_civita"),
+        reference=lc.reference("so3", ["0", "0", "t"]),
+        X0=start,
+        xi0=[0, 0, 0],
+        t=t,
+        tolerance=1e-9,
+    )
+    np.testing.assert_allclose(run.X[:, :9].reshape(-1, 3, 3), alone.X, atol=1e-7)
+    # Both roots -1/2 +- i sqrt(3)/2; the reference starts at velocity (1/5, 1, 0), the body at rest.
+    rate = -np.array([0.2, 1, 0])
+    w = np.sqrt(3) / 2
+    decay = np.exp(-t / 2)[:, None]
+    error = decay * (np.cos(w * t)[:, None] * e + np.sin(w * t)[:, None] * (rate + e / 2) / w)
+    reference = np.stack([t / 5, np.sin(t), np.ones_like(t)], axis=1)
+    np.testing.assert_allclose(run.X[:, 9:] - reference, error, atol=1e-7)
