@@ -191,7 +191,7 @@ def test_rotations_times_vectors_against_the_group_and_a_linear_equation() -> No
     start = expm(lc.group("so3").hat([0.4, 0.3, -0.5]))
     t, e = np.linspace(0, 6, 13), np.array([0.4, 0.3, -1.2])
     run = lc.closed_loop(
-        Q, law=law, reference=moving, X0=[*np.ravel(start), *(e + [0, 0, 1])], xi0=np.zeros(12), t=t, tolerance=1e-9
+        Q, law=law, reference=moving, X0=[*np.ravel(start), *(e + np.eye(3)[2])], xi0=np.zeros(12), t=t, tolerance=1e-9
     )
     alone = lc.closed_loop(
         "so3",
