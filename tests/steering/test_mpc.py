@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ocp_systems import GRAVITY, QUADROTOR, SATELLITE, SE3, SO3, kernel, planar, quadrotor, rotation, satellite
+from ocp_systems import GRAVITY, QUADROTOR, SATELLITE, SE2, SE3, SO3, kernel, planar, quadrotor, rotation, satellite
 from scipy.linalg import expm
 
 import lie_codegen as lc
@@ -188,6 +188,10 @@ def test_numbers_that_are_none_give_the_plans_own_control_and_are_forgotten() ->
     assert controller.status == "input"
     assert np.isfinite(controller.step(np.eye(3))).all()  # q is 2 again
     assert controller.status == "ok"
+    controller.step(np.eye(3), t=np.nan)
+    assert controller.status == "input"
+    controller.step(np.eye(3))
+    assert controller.status == "ok"
     for _ in range(50):
         u = controller.step(np.full((3, 3), np.inf))
         assert np.all(np.abs(u) <= 1.2)
@@ -293,6 +297,8 @@ def test_a_plant_of_ones_own() -> None:
     assert np.linalg.norm(run.X[-1] - rotation((0, 1.0, 0))) < 0.02
     with pytest.raises(InputError, match="plant"):
         controller.simulate(steps=2, plant=windy())
+    with pytest.raises(InputError, match="an interval later"):
+        controller.simulate(steps=2, plant=lambda X, states, u, t, h, rng: X)
     with pytest.raises(InputError, match="noise"):
         controller.simulate(steps=2, noise={"w": 1.0})
 
@@ -344,6 +350,35 @@ def test_the_package_compiles_strictly_and_its_example_is_content(real: str, tmp
     assert str(manifest["operations_worst"]) in (path / "README.md").read_text()
     again = package(controller, tmp_path, real)
     assert json.loads((again / "manifest.json").read_text()) == manifest
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_the_example_of_a_package_is_content_where_a_sample_is_held(tmp_path: Path) -> None:
+    """A car whose trailer stands at an angle psi: near the end of its plan a Gauss-Newton step from the first sample betters nothing."""
+    problem = lc.ocp(
+        SE2,
+        inputs={"v": (), "w": ()},
+        states={"psi": ()},
+        velocity=("w", "v", "0"),
+        rates={"psi": "-v*sin(psi)/1.5 - w"},
+        stage_cost=("v", "w", "0.3*psi"),
+        constraints=("-1 <= psi <= 1",),
+        terminal=("psi",),
+        target="goal",
+        bounds={"v": 1.5, "w": (-1.0, 1.2)},
+        duration=5.0,
+        intervals=40,
+        name="trailer",
+    )
+    controller = lc.mpc(problem)
+    controller.reset(problem.solve(goal=planar(0.5, 2.0, 0.8), starts=4))
+    path = package(controller, tmp_path)
+    statuses = [line.rsplit(",", 1)[1] for line in (path / "test_vectors.csv").read_text().splitlines()[1:]]
+    assert set(statuses) == {"held", "ok"}
+    example(path, "trailer", str(COMPILER))
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.count(" ok\n") == 7
 
 
 @pytest.mark.slow

@@ -35,8 +35,8 @@ def check_problem(data: ProblemData, where: str) -> None:
     value, residual = data.cost(data.stage_cost, at, f"{where}: stage_cost")
     end = Point(at.ops, at.X, {key: each for key, each in at.values.items() if key != "input"}, at.t)
     data.cost(data.terminal_cost, end, f"{where}: terminal_cost")
-    path = data.rows(data.constraints, at)
-    data.rows(data.terminal, end)
+    path = data.rows(data.constraints, at, f"{where}: constraints: ")
+    data.rows(data.terminal, end, f"{where}: terminal: ")
     _check_controls(data, at, ca.SX(value) + ca.SX(total_square(residual)), path, where)
 
 

@@ -18,8 +18,11 @@ from lie_codegen.identifiers import check_identifier
 #: (), (k,), (r, c); or (d, d, 2) for a complex matrix of a complex group, as (re, im).
 Shape = tuple[int, ...]
 
-#: What formulas call by these names is always the same thing, or an option of `solve`.
-RESERVED = ("X", "t", "pi", "starts", "guess", "seed", "threads", "tolerance", "allowed", "iterations")
+#: What formulas call by these names is always the same thing, or an option of `solve`, `reset` or `step`.
+RESERVED = (
+    *("X", "X0", "t", "pi", "plan", "starts", "guess", "seed", "threads", "tolerance", "allowed", "iterations"),
+    *("curvature", "self"),
+)
 
 
 @dataclass(frozen=True)

@@ -200,7 +200,10 @@ def _plant(
 
     def by_hand(k: int, x: Array, u: Array) -> Array:
         X, z = unpack_elements(data, x[None])
-        moved, states = plant(X[0], data.states.split(z[0]), u, k * h, h, rng)
+        answer = plant(X[0], data.states.split(z[0]), u, k * h, h, rng)
+        if not (isinstance(answer, tuple | list) and len(answer) == 2 and isinstance(answer[1], Mapping)):
+            raise InputError(f"{where}: the plant returns (X, {{state: value}}) an interval later, got {answer!r:.60}")
+        moved, states = answer
         element = np.asarray(moved)
         if element.shape != X[0].shape:
             raise ShapeError(f"{where}: the plant gave X of shape {element.shape}; it is {X[0].shape}")

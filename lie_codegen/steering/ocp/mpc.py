@@ -178,10 +178,10 @@ class ModelPredictiveControl:
         if given < len(self._states):
             missing = [name for name in self._states if name not in values]
             raise InputError(f"{self._where()}: no value for the state {', '.join(missing)}")
-        if t is not None:
-            self._t = float(t)
-        status = self._call(0.0 if self._is_free else self._t)
-        self._t += self.sample
+        now = self._t if t is None else float(t)
+        status = self._call(0.0 if self._is_free else now)
+        # a time that is no number is forgotten, as every other: the next sample is one later than this one should have been
+        self._t = (now if np.isfinite(now) else self._t) + self.sample
         self.status = _STATUS[status]
         if changed:
             # what was no number is not kept for the next sample

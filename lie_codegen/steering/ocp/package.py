@@ -18,6 +18,7 @@ from lie_codegen.on_demand import scipy
 from lie_codegen.steering.ocp.budget import Budget, budget_of
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
+from lie_codegen.steering.ocp.machine_base import HELD
 from lie_codegen.steering.ocp.plan import OptimalPlan
 from lie_codegen.steering.ocp.source import CORE, SolverView, render_solver, solver_view
 
@@ -29,11 +30,12 @@ _TOLERANCES = {"double": 1e-8, "float": 5e-3}
 
 @dataclass(frozen=True)
 class SampleVector:
-    """One sample: the measured state, and the control."""
+    """One sample: the measured state, the control, and whether no trial did better ("held")."""
 
     X: tuple[float, ...]
     z: tuple[float, ...]
     u: tuple[float, ...]
+    held: bool
 
 
 def render_mpc_package(
@@ -52,7 +54,10 @@ def render_mpc_package(
     sources = render_solver(view)
     budget = budget_of(view, iterations)
     literal = REALS[real].literal
-    shown = [{key: [literal(x) for x in values] for key, values in asdict(vector).items()} for vector in vectors]
+    shown = [
+        {"held": each.held, **{key: [literal(x) for x in getattr(each, key)] for key in ("X", "z", "u")}}
+        for each in vectors
+    ]
     context = {
         "view": view,
         "vectors": shown,
@@ -104,9 +109,11 @@ def make_vectors(
         states = z[0] + _NOISE * rng.normal(size=len(z[0]))
         u = np.zeros(data.inputs.size)
         time = 0.0 if free else k * h
-        machine.step(space, element, states, rows, time, iterations, u)
+        status = machine.step(space, element, states, rows, time, iterations, u)
         flat = element.astype(complex).ravel().view(float) if data.group.is_complex else element.ravel()
-        vectors.append(SampleVector(tuple(map(float, flat)), tuple(map(float, states)), tuple(map(float, u))))
+        numbers = {"X": flat, "z": states, "u": u}
+        listed = {name: tuple(map(float, values)) for name, values in numbers.items()}
+        vectors.append(SampleVector(**listed, held=status == HELD))
         x = machine.advance(x, u, run.row(k), time, sample, 1)
     return tuple(vectors)
 

@@ -133,7 +133,19 @@ class OptimalControlProblem:
         rest = {name: value for name, value in values.items() if name not in states}
         z = data.states.rows(states, 1, where)[0]
         rows = data.parameters.rows(rest, data.intervals + 1, where)
+        self._check_elements(rows, where)
         return np.concatenate([pack_element(data, element), z]), np.ascontiguousarray(rows)
+
+    def _check_elements(self, rows: Array, where: str) -> None:
+        """What was declared an element of the group is one, at every stage: an end off the group is reached by nothing.
+
+        Raises:
+            NotOnGroupError: naming the parameter.
+        """
+        named = self.data.parameters.split(rows)
+        for name in self.data.elements:
+            for element in np.unique(named[name], axis=0):
+                group_element(self.data.group, element, f"{where}: {name}")
 
     def plan(self, machine: Machine, space: Array, rows: Array, tried: Array, seconds: float) -> OptimalPlan:
         """The plan that a workspace holds."""

@@ -88,7 +88,7 @@ class ProblemData:
     """min sum l + phi subject to X' = X hat(xi), z' = f, lower <= u <= upper, g <= 0, e = 0.
 
     Where the duration is free, between two bounds, it is a state T that does not move, the time of the equations runs from 0 to
-    1 (`duration`), and xi, f, l and t are multiplied by T.
+    1 (`duration`), and xi, f, l and t are multiplied by T. `elements` names the parameters that are elements of the group.
     """
 
     name: str
@@ -109,6 +109,7 @@ class ProblemData:
     quadrature: str
     integrator: str
     free_duration: tuple[float, float] | None = None
+    elements: tuple[str, ...] = ()
 
     @property
     def scope(self) -> Scope:
@@ -201,12 +202,13 @@ class ProblemData:
             return total, residual
         return scale * total, scaled(at.ops.sqrt(scale), residual)
 
-    def rows(self, conditions: tuple[Condition, ...], at: Point) -> Vector:
-        """Entries of conditions, one after the other."""
+    def rows(self, conditions: tuple[Condition, ...], at: Point, where: str = "") -> Vector:
+        """Entries of conditions, one after the other; `where` comes first in messages."""
         scope = self.scope if "input" in at.values else self.end_scope
         at = self._in_seconds(at)
         kinds = {"g": "any", "e": "parts"}  # a complex entry is zero when its parts are; it is not below zero
-        return [entry for each in conditions for entry in scope.evaluate(each.term, at, kinds[each.sense], each.name)]
+        named = [(each, f"{where}{each.name}") for each in conditions]
+        return [entry for each, name in named for entry in scope.evaluate(each.term, at, kinds[each.sense], name)]
 
     @property
     def lasting(self) -> tuple[Condition, ...]:
