@@ -13,7 +13,7 @@ from lie_codegen.control.loop_ports import LoopLaw
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.identifiers import shown
 
-_RTOL = 1e-10
+_RTOL, _SMALLEST = 1e-10, 1e-14
 #: Relative distance from a whole number of samples or steps that is rounding.
 _WHOLE = 1e-6
 
@@ -93,7 +93,7 @@ def error_goal(rtol: float | None, tolerance: float | None, step: float | None) 
     """The one tolerance that was given, or the default.
 
     Raises:
-        InputError, NotFiniteError: two of them, one beside a step, or no positive number.
+        InputError, NotFiniteError: two of them, one beside a step, or no number of at least 1e-14.
     """
     if rtol is not None and tolerance is not None:
         raise InputError("closed_loop: give rtol, or its old name tolerance, not both")
@@ -108,4 +108,8 @@ def error_goal(rtol: float | None, tolerance: float | None, step: float | None) 
         raise NotFiniteError(f"closed_loop: {name} is {value}; give a positive number")
     if value <= 0:
         raise InputError(f"closed_loop: {name} must be positive, got {shown(value)}")
+    if value < _SMALLEST:
+        raise InputError(
+            f"closed_loop: {name} = {value:g} is below {_SMALLEST:g}, which double precision does not reach"
+        )
     return float(value)

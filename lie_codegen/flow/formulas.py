@@ -15,14 +15,17 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.formula_tables import fourier_table
+from lie_codegen.signals.parametric_input import ParametricInput
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 
-def formula_input(group: MatrixGroup, texts: Sequence[str]) -> Callable[[Any], NDArray[np.float64]]:
+def formula_input(
+    group: MatrixGroup, texts: Sequence[str]
+) -> PeriodicInput | ParametricInput | Callable[[Any], NDArray[np.float64]]:
     """u(t) -> (n,), vectorised, from one formula of t for each basis element.
 
-    A PeriodicInput where the formulas are sums and products of sines and cosines of commensurate rates, which compiled
-    loops evaluate themselves.
+    Where the formulas are sums and products of sines and cosines, what compiled loops evaluate themselves: a PeriodicInput
+    if their rates are commensurate, else a ParametricInput without parameters.
 
     Raises:
         ShapeError: not one formula for each basis element.
@@ -32,9 +35,9 @@ def formula_input(group: MatrixGroup, texts: Sequence[str]) -> Callable[[Any], N
         raise ShapeError(
             f"{group.name}: {len(texts)} formulas given, one for each of {', '.join(group.labels)} is needed"
         )
-    series = _series(texts)
-    if series is not None:
-        return series
+    found = _series(texts) or _waves(texts)
+    if found is not None:
+        return found
     t = sp.Symbol("t", real=True)
     expressions = [parse_expression(text, {"t": t, "pi": sp.pi}, FORMULA_FUNCTIONS) for text in texts]
 
@@ -44,6 +47,12 @@ def formula_input(group: MatrixGroup, texts: Sequence[str]) -> Callable[[Any], N
         return np.stack([np.broadcast_to(evaluate(each), times.shape) for each in expressions], axis=-1).astype(float)
 
     return u
+
+
+def _waves(texts: Sequence[str]) -> ParametricInput | None:
+    """The formulas as sums of sines and cosines of any rates, None where they are none."""
+    found = ParametricInput(tuple(texts), ())
+    return None if found.waves is None else found
 
 
 def _series(texts: Sequence[str]) -> PeriodicInput | None:

@@ -17,6 +17,7 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.runtime.formula_input import FormulaInput, fourier_input
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,14 @@ class ParametricInput(Saved):
         flat = np.atleast_1d(times)
         found = self._stacked(self._function(flat, *self.values(given)), flat)
         return found if times.ndim else found[0]
+
+    def as_formula(self, start: float, end: float) -> FormulaInput | None:
+        """Without parameters, a sum of sines and cosines as compiled loops evaluate it; None otherwise."""
+        if self.parameters or self.waves is None or self.breakpoints:
+            return None
+        numbers, F, n = np.array(self.waves.evaluate(), dtype=float), self.waves.count, self.dim
+        cosines, sines = numbers[F:].reshape(2, F, n)
+        return fourier_input(numbers[:F], cosines, sines)
 
     def derivatives(self, t: ArrayLike, **given: Any) -> Array:
         """du/dp: (k, m, n) at (k,) times, m parameters in their order."""

@@ -197,3 +197,9 @@ def test_gauss_steps_of_several_loops_under_a_law() -> None:
         lc.closed_loop("so3", method="gauss", **given)
     with pytest.raises(ComputationError, match="too long"):
         lc.closed_loop("so3", inertia=(1, 2, 3), xi0=[50.0, 1, 1], t=[0, 1], step=1.0, method="gauss")
+
+
+def test_a_tolerance_below_rounding_is_refused() -> None:
+    law = lc.attitude_law("pd", inertia=(1, 2, 3), k_p=4, k_d=6)
+    with pytest.raises(lc.errors.InputError, match="rtol = 1e-15 is below 1e-14"):
+        lc.closed_loop("so3", law=law, inertia=(1, 2, 3), X0=np.eye(3), xi0=[1, 0, 0], t=[0, 1], rtol=1e-15)

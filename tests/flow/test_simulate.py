@@ -213,3 +213,39 @@ def test_texts_where_numbers_belong_are_named() -> None:
     ):
         with pytest.raises(InputError, match=r"expected (a|the name of a) group"):
             call()
+
+
+def test_steps_of_a_function_are_as_many_as_were_asked_for() -> None:
+    """The pieces by which a function is read do not cut the steps: their error falls with the order, not with the pieces."""
+    group = lc.group("se3")
+    a, b, c = np.random.default_rng(3).normal(size=(3, group.dim)) / np.sqrt(group.dim)
+
+    def u(t: float) -> np.ndarray:
+        return a * np.cos(t) + b * np.exp(-((t - 2) ** 2)) + c * t / 4
+
+    wanted = solve_ivp(
+        lambda t, x: (x.reshape(4, 4) @ group.hat(u(t))).ravel(), (0, 4), np.eye(4).ravel(), method="DOP853", rtol=2.3e-14, atol=1e-14
+    ).y[:, -1].reshape(4, 4)  # fmt: skip
+    for order, counts in ((4, (40, 80)), (6, (40, 80)), (8, (16, 28))):
+        runs = [lc.simulate(group, u, t=[0, 2, 4], method=f"magnus{order}", steps=count) for count in counts]
+        coarse, fine = (np.max(np.abs(run.X[-1] - wanted)) for run in runs)
+        assert [run.steps for run in runs] == list(counts)
+        assert np.log(coarse / fine) / np.log(counts[1] / counts[0]) == pytest.approx(order, abs=0.5)
+        np.testing.assert_array_equal(runs[1].at(2.0), runs[1].X[1])
+        np.testing.assert_allclose(
+            runs[1].at(2.5), lc.simulate(group, u, t=[0, 2.5]).X[-1], rtol=0, atol=3 * fine + 1e-9
+        )
+
+
+def test_texts_of_any_rates_are_evaluated_by_the_loop() -> None:
+    """Nothing is read, so nothing is missed; and the same as the function."""
+    texts = ["cos(t)*sin(sqrt(2)*t)", "3*cos(123456789012345*t/10^15)/10", "1/3"]
+
+    def u(t: float) -> np.ndarray:
+        return np.array([np.cos(t) * np.sin(np.sqrt(2) * t), 0.3 * np.cos(0.123456789012345 * t), 1 / 3])
+
+    run, read = lc.simulate("so3", texts, t=[0, 1, 5]), lc.simulate("so3", u, t=[0, 1, 5])
+    assert run.resolution == run.evaluations == 0 < read.resolution
+    np.testing.assert_allclose(run.X, read.X, rtol=0, atol=1e-11)
+    same = lc.simulate("so3", lc.ParametricInput(texts, ()), t=[0, 1, 5])
+    np.testing.assert_array_equal(run.X, same.X)

@@ -43,7 +43,7 @@ class MagnusRun:
 
     Attributes:
         order: 4, 6 or 8.
-        multiple: how many times the coarsest steps were divided.
+        multiple: how many times the coarsest steps were divided; 0 for a number of steps that was given.
         steps: the number of steps.
         longest, shortest: of them.
         error_estimate: of the entries of X: from the runs with longer steps, and what reading u left out.
@@ -151,14 +151,26 @@ def fixed_run(
     group: MatrixGroup, drive: Drive, times: Array, X0: Array, *, order: int, steps: int, threads: int = 1
 ) -> MagnusRun:
     """So many equal steps between the first and the last time, or the next more that end at every time and jump of u."""
+    wanted = steps / (times[-1] - times[0]) * (1 - 1e-12)
+    if drive.terms:
+        # The pieces of a function were cut for its reading, not for the steps: each step has one of its own instead.
+        knots = np.union1d(times, drive.corners[(drive.corners > times[0]) & (drive.corners < times[-1])])
+        counts = np.maximum(np.ceil(np.diff(knots) * wanted), 1).astype(int)
+        drive = drive.on_pieces(
+            np.append(
+                np.concatenate(
+                    [np.linspace(a, b, c + 1)[:-1] for a, b, c in zip(knots, knots[1:], counts, strict=False)]
+                ),
+                times[-1],
+            )
+        )
     planned = plan_steps(drive, np.zeros((group.dim + 1, group.dim)), times, MOST_STEPS)
     if planned is None:
         raise ComputationError(f"simulate({group.name}): u is not finite")
-    widths = np.diff(planned.knots)
-    parts = np.maximum(np.ceil(widths / (times[-1] - times[0]) * steps * (1 - 1e-12)), 1).astype(np.intp)
-    chosen = Steps(planned.knots, parts, planned.piece, planned.slot, planned.slots)
+    parts = np.ones_like(planned.parts) if drive.terms else np.maximum(np.ceil(np.diff(planned.knots) * wanted), 1)
+    chosen = Steps(planned.knots, parts.astype(np.intp), planned.piece, planned.slot, planned.slots)
     X = _finite(flow(group, drive, chosen, order, X0, threads), f"simulate({group.name})")
-    return MagnusRun(X, order, 1, chosen.count, chosen.longest, chosen.shortest, float("nan"))
+    return MagnusRun(X, order, 0, chosen.count, chosen.longest, chosen.shortest, float("nan"))
 
 
 @lru_cache(maxsize=32)
