@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import collections
+import itertools
+import signal
+import threading
 from itertools import pairwise
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -82,15 +87,40 @@ def test_the_compiled_program_is_the_symbolic_one(monkeypatch: pytest.MonkeyPatc
     assert slow.cost == pytest.approx(quick.cost, rel=1e-6)
 
 
+class Endless:
+    """Whoever unpickles it counts for ever, inside C."""
+
+    def __reduce__(self) -> Any:
+        return collections.deque, (itertools.repeat(0), 0)
+
+
 def test_a_solver_that_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """fatrop can loop for ever; ipopt then takes over, and the next problem finds a new process."""
     group, options = lc.group("so3"), {"intervals": 16, "starts": 1, "bounds": 20.0}
+    transcription_problem.program.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setattr(watched_solver, "_PATIENCE", -1e3)
+        patch.setattr(watched_solver, "_PATIENCE", 0.1)
+        patch.setitem(transcription_problem._FATROP, "print_level", Endless())
         plan = lc.steer(group, G, (0, 1), 1.0, **options)
-    assert "ended after" in plan.details["solves"][0].message
+    transcription_problem.program.cache_clear()
+    assert "of processor time" in plan.details["solves"][0].message
     assert plan.details["solver"] == "ipopt"
     assert lc.steer(group, G, (0, 1), 1.0, **options).details["solver"] == "fatrop"
+
+
+@pytest.mark.skipif(not watched_solver._COUNTS, reason="no timer of processor time")
+def test_time_in_which_a_solver_does_not_run_is_not_counted() -> None:
+    """The process is stopped for longer than it may take, and answers all the same."""
+    worker = watched_solver._Worker()
+    try:
+        worker.ask(("none", "none", {}, {}), 0.2)  # an error is an answer
+        assert worker._running is not None
+        process = worker._running.process
+        process.send_signal(signal.SIGSTOP)
+        threading.Timer(0.5, lambda: process.send_signal(signal.SIGCONT)).start()
+        assert isinstance(worker.ask(("none", "none", {}, {}), 0.2), RuntimeError)
+    finally:
+        worker.end()
 
 
 def test_every_solve_is_on_record_and_told_when_asked() -> None:

@@ -1,8 +1,9 @@
 """A nonlinear solver in a process of its own, because fatrop can loop for ever inside its linear algebra.
 
 No call of it can be stopped from within: the oracle is not asked again there, and no option bounds the loop. So the program, a
-compiled library, is solved by `python -m lie_codegen.steering.transcription.watched_solver`, one for this process, which is
-ended when it takes too long; the next program starts another. A request costs a tenth of a millisecond.
+compiled library, is solved by `python -m lie_codegen.steering.transcription.watched_solver`, one for this process. It has so much
+processor time for a request, after which the system ends it; the next program starts another. What else the machine does is not
+counted, so that the same program has the same answer on a busy one. A request costs a tenth of a millisecond.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import atexit
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -25,10 +27,10 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.runtime.child import child_environment
 
-#: Seconds for one program, and more for each variable. A solve takes a tenth of it where it takes long.
+#: Seconds of processor time for one program, and more for each variable. A solve takes a tenth of it where it takes long.
 _PATIENCE, _EACH = 4.0, 1 / 400
-#: Seconds for a new process to import what it needs.
-_START = 60.0
+#: A process can be told to end after so much processor time (Windows has no such timer: there it is the clock's, while we wait).
+_COUNTS = hasattr(signal, "setitimer")
 
 
 class WatchedSolver:
@@ -51,7 +53,7 @@ class WatchedSolver:
         if isinstance(answer, Exception):
             raise answer
         if answer is None:
-            self._stats = {"unified_return_status": f"ended after {seconds:.3g} s", "iter_count": -1}
+            self._stats = {"unified_return_status": f"ended after {seconds:.3g} s of processor time", "iter_count": -1}
             size, rows = len(given["x0"]), len(given["lbg"])
             return {"x": np.full(size, np.nan), "f": np.array(np.nan), "g": np.full(rows, np.nan)}
         result, self._stats = answer
@@ -86,18 +88,23 @@ class _Worker:
         self._reader = ThreadPoolExecutor(1, "lie_codegen-solver")
 
     def ask(self, request: Any, seconds: float) -> Any:
-        """The answer; None if it does not come in time, or the process dies."""
+        """The answer; None if it takes more than so many seconds of processor time, or the process dies."""
         with self._lock:
             try:
                 running = self._started()
-                pickle.dump(request, running.requests)
+                for each in (seconds, request):
+                    pickle.dump(each, running.requests)
                 running.requests.flush()
-                return self._answer(running, seconds)
+                return self._answer(running, None if _COUNTS else seconds)
             except (Late, OSError, EOFError, pickle.UnpicklingError):
                 self.end()
                 return None
+            except BaseException:
+                # Ctrl-C: the answer that is still to come would be read as the next request's
+                self.end()
+                raise
 
-    def _answer(self, running: _Running, seconds: float) -> Any:
+    def _answer(self, running: _Running, seconds: float | None) -> Any:
         return self._reader.submit(pickle.load, running.answers).result(seconds)
 
     def _started(self) -> _Running:
@@ -110,7 +117,7 @@ class _Worker:
             if process.stdin is None or process.stdout is None:
                 raise OSError("no pipes")
             running = self._running = _Running(process, process.stdin, process.stdout)
-            self._answer(running, _START)
+            self._answer(running, None)
         return running
 
     def end(self) -> None:
@@ -128,6 +135,12 @@ _worker = _Worker()
 atexit.register(_worker.end)
 
 
+def _end_after(seconds: float) -> None:
+    """This process ends once it has used so much more processor time: SIGPROF, with nobody to hear it, ends it in the midst of C."""
+    if _COUNTS:
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+
 def _serve() -> None:
     """Answers requests from standard input until it ends; what solvers print goes to standard error."""
     import casadi as ca
@@ -143,6 +156,7 @@ def _serve() -> None:
     answer("ready")
     while True:
         try:
+            _end_after(pickle.load(sys.stdin.buffer))
             solver, library, options, numbers = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
