@@ -119,6 +119,8 @@ def _hashed(value: Any) -> int:
         return hash(frozenset((key, _hashed(each)) for key, each in value.items()))
     if isinstance(value, list | tuple):
         return hash(tuple(map(_hashed, value)))
+    if getattr(value, "definition", None) is not None:
+        return hash(value)  # as `same` compares it
     if is_dataclass(value) and not isinstance(value, Value | type):
         return hash((type(value).__name__, *(_hashed(getattr(value, name)) for name in _compared(value))))
     return hash("nan") if _is_nan(value) else hash(value)

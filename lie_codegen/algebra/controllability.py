@@ -11,10 +11,11 @@ from lie_codegen.algebra.lyndon import BracketWord, Word, bracket_word, lyndon_w
 from lie_codegen.errors import InputError, UncontrollableError
 from lie_codegen.exact.numbers import Number, domain_matrix
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.values import Value
 
 
-@dataclass(frozen=True)
-class Controllability:
+@dataclass(frozen=True, eq=False, repr=False)
+class Controllability(Value):
     """What the brackets of the controls reach.
 
     Attributes:

@@ -25,10 +25,11 @@ from lie_codegen.algebra.subspace import (
 from lie_codegen.errors import ComputationError
 from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.values import Value
 
 
-@dataclass(frozen=True)
-class Structure:
+@dataclass(frozen=True, eq=False, repr=False)
+class Structure(Value):
     """What an algebra is made of; subspaces are tuples of coordinate vectors in reduced row echelon form.
 
     Attributes:

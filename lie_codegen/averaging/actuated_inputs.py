@@ -12,6 +12,7 @@ from lie_codegen.averaging.averaged import average
 from lie_codegen.errors import AssumptionError, InputError, ShapeError
 from lie_codegen.exact.expression import time_symbol
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
@@ -28,8 +29,8 @@ def wheel_input(wheels: MomentumWheels, wheel_rates: PeriodicInput) -> PeriodicI
     return wheel_rates.linear(wheels.exact_C)
 
 
-@dataclass(frozen=True)
-class OscillatorAverage:
+@dataclass(frozen=True, eq=False, repr=False)
+class OscillatorAverage(Saved):
     """The drift of a body with a point mass moving along y = eps x(t): Omega = eps^2 u_2 + eps^4 u_4 + O(eps^6).
 
     Attributes:

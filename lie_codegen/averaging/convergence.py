@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 from lie_codegen.algebra.brackets import ad
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 _PANELS = 64
 
 
-@dataclass(frozen=True)
-class Convergence:
+@dataclass(frozen=True, eq=False, repr=False)
+class Convergence(Saved):
     """The norms whose integrals the conditions bound, and how long each condition holds.
 
     Attributes:

@@ -19,6 +19,7 @@ from lie_codegen.averaging.order_check import checked_scales
 from lie_codegen.flow.attitude_metrics import distances, rotation_angle
 from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 
@@ -28,8 +29,8 @@ def corollary_bound(delta: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(9 * np.abs(np.cos(d) - 1) + 7 * np.abs(np.sin(d)) + np.sin(d) ** 2)
 
 
-@dataclass(frozen=True)
-class BoundCheck:
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundCheck(Saved):
     """Measured errors against the corollary's bounds, for each eps.
 
     Attributes:

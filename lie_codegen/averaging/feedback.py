@@ -41,8 +41,8 @@ from lie_codegen.signals.trig_signal import TrigCalculus
 _MARGIN = 1e-9
 
 
-@dataclass(frozen=True)
-class Stability:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stability(Saved):
     """What Proposition 1 says about one equilibrium of the averaged system.
 
     Attributes:

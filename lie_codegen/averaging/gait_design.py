@@ -20,8 +20,8 @@ from lie_codegen.averaging.shape_connection import ShapeConnection
 from lie_codegen.errors import InputError
 from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.periodic_input import PeriodicInput
-from lie_codegen.values import Value
 
 _COMPLEX_STEP = 1e-30
 _SERIES = 14
@@ -29,7 +29,7 @@ _SETTLED, _MOST_STEPS = 1e-7, 300
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Gait(Value):
+class Gait(Saved):
     """A gait that was found.
 
     Attributes:

@@ -24,6 +24,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import bernoulli
 from lie_codegen.signals.periodic_input import PeriodicInput
@@ -32,29 +33,46 @@ from lie_codegen.signals.time_series import expressions_of, functions_of
 _MOST = 12
 
 
-@dataclass(frozen=True, eq=False)
-class Magnus:
+@dataclass(frozen=True, eq=False, repr=False)
+class Magnus(Saved):
     """The Magnus series of X' = eps X hat(u), X(0) = I, to order p.
 
     Attributes:
-        group, u, order: what was expanded and how far.
+        group, u, order: what is expanded, when it is first read, and how far.
     """
 
     group: MatrixGroup
     u: PeriodicInput
     order: int
-    _calculus: Any
-    _signals: tuple[Any, ...]
+
+    @cached_property
+    def _series(self) -> tuple[Any, tuple[Any, ...]]:
+        """The calculus of the input's functions, and Z_1 .. Z_p in it."""
+        calculus, signal = self.u.waveform.calculus(self.group.algebra.table, self.group.dim)
+        weights = [
+            abs(b) / factorial(k) if k == 1 else b / factorial(k) for k, b in enumerate(bernoulli(self.order + 1))
+        ]
+        found: list[Any] = []
+        nested: dict[tuple[int, int], Any] = {(0, 1): signal}
+        for q in range(1, self.order + 1):
+            terms: list[tuple[Fraction | int, Any]] = [(1, signal)] if q == 1 else []
+            for k in range(1, q):
+                inner = [(m, nested[k - 1, q - m]) for m in range(1, q) if (k - 1, q - m) in nested]
+                value = calculus.combine([(1, calculus.bracket(found[m - 1], s)) for m, s in inner])
+                nested[k, q] = value
+                terms.append((weights[k], value))
+            found.append(calculus.primitive(calculus.combine(terms)))
+        return calculus, tuple(found)
 
     @cached_property
     def exact_Z(self) -> tuple[sp.ImmutableMatrix, ...]:
         """Z_1 .. Z_p, each (n, 1), as expressions in t."""
-        return expressions_of(self.u, self._calculus, self._signals)
+        return expressions_of(self.u, *self._series)
 
     @cached_property
     def Z(self) -> list[Callable[[ArrayLike], Array]]:
         """[Z_1, .., Z_p]: functions of t, (...,) -> (..., n)."""
-        return functions_of(self.u, self._calculus, self._signals)
+        return functions_of(self.u, *self._series)
 
     def exponent(self, eps: float, t: ArrayLike) -> Array:
         """sum_{q<=p} eps^q Z_q(t): (...,) -> (..., n)."""
@@ -82,16 +100,4 @@ def magnus(group: GroupLike, u: PeriodicInput, order: int) -> Magnus:
         raise ShapeError(f"magnus: u has {u.dim} components, {group.name} has {group.dim}: {', '.join(group.labels)}")
     if not u.waveform.has_formula:
         raise InputError("magnus: the input has no one formula; the Magnus series needs sums of sines and cosines")
-    calculus, signal = u.waveform.calculus(group.algebra.table, group.dim)
-    weights = [abs(b) / factorial(k) if k == 1 else b / factorial(k) for k, b in enumerate(bernoulli(order + 1))]
-    found: list[Any] = []
-    nested: dict[tuple[int, int], Any] = {(0, 1): signal}
-    for q in range(1, order + 1):
-        terms: list[tuple[Fraction | int, Any]] = [(1, signal)] if q == 1 else []
-        for k in range(1, q):
-            inner = [(m, nested[k - 1, q - m]) for m in range(1, q) if (k - 1, q - m) in nested]
-            value = calculus.combine([(1, calculus.bracket(found[m - 1], s)) for m, s in inner])
-            nested[k, q] = value
-            terms.append((weights[k], value))
-        found.append(calculus.primitive(calculus.combine(terms)))
-    return Magnus(group, u, order, calculus, tuple(found))
+    return Magnus(group, u, order)

@@ -24,11 +24,11 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.runge_kutta import ARRAYS, CLASSICAL, increment
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.advected import Advected
 from lie_codegen.mechanics.polynomial_fields import Field, PullBackSpace, gathered, integrated
 from lie_codegen.mechanics.polynomial_kernels import evaluate
 from lie_codegen.signals.floquet_magnus import Calculus, floquet_magnus
-from lie_codegen.values import Value
 
 _MOST = 10
 #: Points of the circle in the plane of eps from which Taylor coefficients are read, and its radius in units of the gait.
@@ -38,7 +38,7 @@ _FLOW_STEPS = 32
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GaitAverage(Value):
+class GaitAverage(Saved):
     """The average of a gait.
 
     Attributes:

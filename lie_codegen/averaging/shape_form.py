@@ -15,8 +15,8 @@ from lie_codegen.averaging.path_end import end_of
 from lie_codegen.averaging.shape_frame import ShapeFrame
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.values import Value
 
 #: Step of the complex differences that give exact first derivatives of analytic formulas.
 _COMPLEX_STEP = 1e-30
@@ -25,7 +25,7 @@ _SINGULAR = 1e-11
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShapeForm(Value):
+class ShapeForm(Saved):
     """A principal connection: xi = -A(r) r'.
 
     Attributes:

@@ -15,7 +15,7 @@ from lie_codegen.algebra.brackets import ad
 from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 _NODES, _STEPS, _SETTLED = 7, 12, 1e-10
 _COMPLEX_STEP = 1e-30
@@ -23,7 +23,7 @@ _SERIES = 24
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShapeFrame(Value):
+class ShapeFrame(Saved):
     """h(r) = exp(beta(r)).
 
     Attributes:

@@ -22,10 +22,11 @@ from lie_codegen.algebra.brackets import bracket
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.kernel.saved import Saved
 
 
-@dataclass(frozen=True)
-class VibrationLine:
+@dataclass(frozen=True, eq=False, repr=False)
+class VibrationLine(Saved):
     """u(t) = cosine cos(omega t) + sine sin(omega t).
 
     Attributes:

@@ -27,13 +27,14 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.positive_matrix import as_floats, eigenvalues, positive_matrix, positive_number
+from lie_codegen.kernel.saved import Saved
 
 #: c' of the torque's gyroscopic term, by name.
 GYROSCOPIC = {"cancel": 1, "none": 0, "double": -1}
 
 
-@dataclass(frozen=True)
-class AttitudeRegion:
+@dataclass(frozen=True, eq=False, repr=False)
+class AttitudeRegion(Saved):
     """Whether an initial state lies in the proved region of attraction.
 
     Attributes:
@@ -100,8 +101,8 @@ def attitude_linearisation(*, inertia: Any, k_p: Any, k_d: Any) -> np.ndarray:
     return np.linalg.eigvals(np.vstack([np.hstack([zero, one]), below]))
 
 
-@dataclass(frozen=True)
-class ResponseGains:
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseGains(Saved):
     """Gains for a wanted response of the linearised loop I x'' + K_d x' + H x = 0.
 
     Attributes:

@@ -32,14 +32,15 @@ from lie_codegen.kernel.dual import (
     tangent_of,
 )
 from lie_codegen.kernel.linear import Matrix, identity, matmul, matvec, plus, transpose
+from lie_codegen.kernel.saved import Saved
 
 _POINTS = 3
 _DIGITS = 50
 _TOLERANCE = Fraction(1, 10**35)
 
 
-@dataclass(frozen=True)
-class Compatibility:
+@dataclass(frozen=True, eq=False, repr=False)
+class Compatibility(Saved):
     """What was found.
 
     Attributes:

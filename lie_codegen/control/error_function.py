@@ -22,6 +22,7 @@ from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.matrix_formula import MatrixLog, matrix_formula, scalar_formula
 from lie_codegen.kernel.parameter import is_input
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
@@ -108,8 +109,8 @@ class ErrorSymbols:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ErrorFunction:
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorFunction(Saved):
     """A pair (phi, transport map) on a group.
 
     Attributes:

@@ -15,10 +15,11 @@ from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.kernel.saved import Saved
 
 
-@dataclass(frozen=True)
-class LinearLoop:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinearLoop(Saved):
     """The loop near its reference.
 
     Attributes:

@@ -21,10 +21,11 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
+from lie_codegen.kernel.saved import Saved
 
 
-@dataclass(frozen=True)
-class TrackingRegion:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrackingRegion(Saved):
     """Where a state lies.
 
     Attributes:
@@ -73,8 +74,8 @@ def tracking_region(
     return _region(pair, W)
 
 
-@dataclass(frozen=True)
-class QuadraticConstants:
+@dataclass(frozen=True, eq=False, repr=False)
+class QuadraticConstants(Saved):
     """b_1 >= phi/|d phi|^2 >= b_2 where phi < L - epsilon (A1), norms by the inertia."""
 
     L: float

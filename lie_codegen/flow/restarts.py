@@ -16,14 +16,15 @@ from lie_codegen.flow.chart import Samples, newton
 from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 
 _SMALLEST_DETERMINANT = 0.25
 _LARGEST_GROWTH = 10.0
 _BLOCK = 512
 
 
-@dataclass(frozen=True)
-class Chart:
+@dataclass(frozen=True, eq=False, repr=False)
+class Chart(Saved):
     """One chart of a trajectory: X(t) = origin exp(g_1 A_1) ... exp(g_n A_n) for start <= t <= end.
 
     Attributes:

@@ -17,12 +17,12 @@ from lie_codegen.errors import AlgebraError
 from lie_codegen.exact.numbers import domain_matrix, to_numbers
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.values import Value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CartanInvolution(Value):
+class CartanInvolution(Saved):
     """theta, with fixed points k (compact) and -1 on p: -K(x, theta y) is positive.
 
     Attributes:

@@ -25,6 +25,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.numbers import domain_matrix, exact_number
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.connection import metric_of, symmetric_product
 from lie_codegen.mechanics.euler_poincare import euler_poincare, velocity_symbols
 from lie_codegen.on_demand import sympy as sp
@@ -34,8 +35,8 @@ _DEGREE = 4
 Vector: TypeAlias = "list[sp.Expr]"
 
 
-@dataclass(frozen=True)
-class SecondOrderControllability:
+@dataclass(frozen=True, eq=False, repr=False)
+class SecondOrderControllability(Saved):
     """What the forces reach from rest.
 
     Attributes:
@@ -133,8 +134,8 @@ def accessibility_rank(
     return int(domain_matrix(rows).rank())
 
 
-@dataclass(frozen=True)
-class DirectionObservability:
+@dataclass(frozen=True, eq=False, repr=False)
+class DirectionObservability(Saved):
     """What a body sensor of one inertial direction, y = R' z, tells about a free body.
 
     Attributes:

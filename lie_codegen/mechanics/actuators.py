@@ -16,11 +16,12 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 
 
-@dataclass(frozen=True)
-class MomentumWheels:
+@dataclass(frozen=True, eq=False, repr=False)
+class MomentumWheels(Saved):
     """p wheels fixed in a rigid body, any axes; Omega = C theta', (68).
 
     Attributes:
@@ -112,8 +113,8 @@ class MomentumWheels:
         return np.array(self.exact_C.cofactor_matrix().tolist(), dtype=float)
 
 
-@dataclass(frozen=True)
-class PointMassOscillator:
+@dataclass(frozen=True, eq=False, repr=False)
+class PointMassOscillator(Saved):
     """A point mass moved along y(t) in body axes, starting at the centre of mass; section 6.2.
 
     Attributes:

@@ -21,13 +21,13 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import check_identifier
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 KINDS = ("direction", "point", "momentum", "adjoint")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Advected(Value):
+class Advected(Saved):
     """One advected vector.
 
     Attributes:

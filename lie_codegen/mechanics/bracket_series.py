@@ -15,6 +15,7 @@ from fractions import Fraction
 from itertools import combinations_with_replacement
 
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import floquet_magnus
 from lie_codegen.signals.periodic_input import PeriodicInput
@@ -28,8 +29,8 @@ GAUGES = ("zero_mean", "pull_back")
 _MOST = 4
 
 
-@dataclass(frozen=True)
-class BracketTerm:
+@dataclass(frozen=True, eq=False, repr=False)
+class BracketTerm(Saved):
     """One row of the table.
 
     Attributes:
@@ -83,8 +84,8 @@ class _Calculus:
         return _kept({word: f.primitive() if self.zero_mean else f.integral() for word, f in x.items()})
 
 
-@dataclass(frozen=True)
-class BracketSeries:
+@dataclass(frozen=True, eq=False, repr=False)
+class BracketSeries(Saved):
     """The series of an input.
 
     Attributes:

@@ -16,6 +16,7 @@ from lie_codegen.flow.inputs import Signal, as_signal
 from lie_codegen.flow.rollout import BLOCK
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.call import Compiled
@@ -28,8 +29,8 @@ _LARGEST_MOVE = 0.25
 _MOST_STEPS = 2**21
 
 
-@dataclass(frozen=True)
-class Driven:
+@dataclass(frozen=True, eq=False, repr=False)
+class Driven(Saved):
     """A solution of X' = X hat(xi), J xi' = ad*_xi J xi + f(t).
 
     Attributes:

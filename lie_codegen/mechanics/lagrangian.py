@@ -15,6 +15,7 @@ from typing import Any
 from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import Meter, expanded_terms
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.mechanics.vector_fields import Field, tidy
 from lie_codegen.on_demand import sympy as sp
@@ -22,8 +23,8 @@ from lie_codegen.on_demand import sympy as sp
 _CONSTANTS = {"pi"}
 
 
-@dataclass(frozen=True)
-class LagrangianSystem:
+@dataclass(frozen=True, eq=False, repr=False)
+class LagrangianSystem(Saved):
     """A mechanical system in exact form.
 
     Attributes:

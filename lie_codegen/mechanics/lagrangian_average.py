@@ -14,6 +14,7 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, plus, scaled
 from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.bracket_series import BracketSeries, bracket_series, check_series
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.lagrangian_fields import Dynamics, Fields
@@ -24,8 +25,8 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.signals.time_polynomial import fourier_terms
 
 
-@dataclass(frozen=True)
-class LagrangianSeries:
+@dataclass(frozen=True, eq=False, repr=False)
+class LagrangianSeries(Saved):
     """What the average of a Lagrangian system is made of: the series of the input and the formulas of the system.
 
     Attributes:

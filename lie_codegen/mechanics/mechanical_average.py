@@ -17,6 +17,7 @@ from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.runge_kutta import CLASSICAL, TUPLES, increment
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.effective_potential import EffectivePotential, effective_potential
 from lie_codegen.mechanics.mechanical_fields import GAUGES, MOST, MechanicalFields, fourier_of
 from lie_codegen.mechanics.mechanical_kernels import (
@@ -34,7 +35,6 @@ from lie_codegen.mechanics.polynomial_kernels import evaluate
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
-from lie_codegen.values import Value
 
 #: Steps of the unit-time flow of the frozen correction, a motion of size eps: its error is far below that of any order.
 _FLOW_STEPS = 8
@@ -47,8 +47,8 @@ class GroupState(NamedTuple):
     xi: Array
 
 
-@dataclass(frozen=True)
-class VibrationalOrderCheck:
+@dataclass(frozen=True, eq=False, repr=False)
+class VibrationalOrderCheck(Saved):
     """Errors of the orders 1 .. p at the end of a run of fixed length, always at one fast phase.
 
     Attributes:
@@ -65,7 +65,7 @@ class VibrationalOrderCheck:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MechanicalAverage(Value):
+class MechanicalAverage(Saved):
     """The averaged system of J xi' = ad*_xi J xi + f - D xi + (1/eps) b_a u^a(t / eps), X' = X hat(xi), to any order.
 
     The averaged state z = (X, xi) moves by X' = X hat(alpha), xi' = beta with (alpha, beta) = sum_q eps^(q-1) F_q: from order 2

@@ -19,6 +19,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
 from lie_codegen.mechanics.polynomial_fields import Field, FieldSpace, PullBackSpace, gathered
 from lie_codegen.signals.floquet_magnus import floquet_magnus
@@ -106,8 +107,8 @@ def fourier_of(u: PeriodicInput) -> tuple[Fourier, Array]:
     return Fourier(waves[:, : highest + 1], period), mean
 
 
-@dataclass(frozen=True, eq=False)
-class MechanicalFields:
+@dataclass(frozen=True, eq=False, repr=False)
+class MechanicalFields(Saved):
     """The fields of an average, with doubles for coefficients.
 
     Attributes:

@@ -16,17 +16,17 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.exact_arithmetic import ExactArithmetic
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.advected import Advected, advected_vectors
 from lie_codegen.mechanics.formulas import formula, quantity
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.values import Value
 
 #: A term of a polynomial: exponents of (xi, Gamma), coefficient.
 Terms = tuple[tuple[tuple[int, ...], float], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MechanicalSystem(Value):
+class MechanicalSystem(Saved):
     """A body on a group under forces that are polynomials of its velocity and of advected vectors.
 
     Attributes:

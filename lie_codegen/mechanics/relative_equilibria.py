@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.routh import RouthReduction
 from lie_codegen.on_demand import sympy as sp
@@ -27,8 +28,8 @@ RANK_TOLERANCE = 1e-9
 _DISTINCT = 1e-7
 
 
-@dataclass(frozen=True)
-class RelativeEquilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class RelativeEquilibrium(Saved):
     """An equilibrium of a reduced system and its linearisation.
 
     Attributes:
@@ -69,8 +70,8 @@ class RelativeEquilibrium:
         return "unstable" if self.eigenvalues.real.max() > 1e-9 else "spectrally stable"
 
 
-@dataclass(frozen=True)
-class LinearControllability:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinearControllability(Saved):
     """The verdict of the rank test.
 
     Attributes:

@@ -16,14 +16,15 @@ from typing import Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, names_in
 from lie_codegen.mechanics.lagrangian import LagrangianSystem, system_from
 from lie_codegen.mechanics.vector_fields import tidy
 from lie_codegen.on_demand import sympy as sp
 
 
-@dataclass(frozen=True)
-class RouthReduction:
+@dataclass(frozen=True, eq=False, repr=False)
+class RouthReduction(Saved):
     """A system with its cyclic coordinates eliminated.
 
     Attributes:

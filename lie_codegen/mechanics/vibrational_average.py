@@ -14,6 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.bracket_series import BracketTerm, bracket_series, word_text
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.lagrangian_average import LagrangianSeries, series_kernels
@@ -26,7 +27,6 @@ from lie_codegen.mechanics.vibrational_kernels import term_kernels, vibrational_
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
-from lie_codegen.values import Value
 
 NAMESPACE = "vibrational"
 #: Coordinates up to which brackets are symbols: beyond, and beyond order 2, they are taken by dual numbers.
@@ -34,7 +34,7 @@ _SYMBOLIC = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VibrationalAverage(Value):
+class VibrationalAverage(Saved):
     """The averaged system of y' = X(y) + (1/eps) Y_a(q) u^a(t / eps).
 
     Attributes:

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.lagrangian_average import LagrangianSeries
 from lie_codegen.mechanics.relative_equilibria import newton, parameter_numbers
 from lie_codegen.mechanics.vibrational_fields import VibrationalFields, fast_time
@@ -28,8 +29,8 @@ from lie_codegen.on_demand import sympy as sp
 _AUTHORITY = 1e-8
 
 
-@dataclass(frozen=True)
-class VibrationalFeedback:
+@dataclass(frozen=True, eq=False, repr=False)
+class VibrationalFeedback(Saved):
     """A designed amplitude feedback.
 
     Attributes:

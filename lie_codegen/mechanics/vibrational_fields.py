@@ -27,6 +27,7 @@ from functools import cache, cached_property
 from itertools import combinations_with_replacement, product
 
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.mechanics.routh import RouthReduction
 from lie_codegen.mechanics.vector_fields import (
@@ -50,8 +51,8 @@ def fast_time() -> sp.Symbol:
     return sp.Symbol("tau", real=True)
 
 
-@dataclass(frozen=True)
-class VibrationalFields:
+@dataclass(frozen=True, eq=False, repr=False)
+class VibrationalFields(Saved):
     """The exact averaged system.
 
     Attributes:

@@ -17,6 +17,7 @@ from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS, nome
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body import euler_kernels
 from lie_codegen.rigid_body.euler_second_order import (
     MARGIN,
@@ -33,7 +34,6 @@ from lie_codegen.rigid_body.phase_as_time import cycle_growth, phase_time_kernel
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
-from lie_codegen.values import Value
 
 NAMESPACE = "euler_average"
 _MOST_NODES = 8192
@@ -57,7 +57,7 @@ class Averaged(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EulerAverage(Value):
+class EulerAverage(Saved):
     """The variational equations of a perturbed free rigid body, and their averages, per unit eps.
 
     Attributes:

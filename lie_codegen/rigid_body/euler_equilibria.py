@@ -11,12 +11,13 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS, jacobi, ladder
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU
 
 
-@dataclass(frozen=True)
-class LimitCycle:
+@dataclass(frozen=True, eq=False, repr=False)
+class LimitCycle(Saved):
     """A root k of the averaged Fbar_k: a closed curve on the momentum sphere that the motion keeps or leaves.
 
     Attributes:
@@ -68,8 +69,8 @@ def limit_cycles(
     return tuple(cycles)
 
 
-@dataclass(frozen=True)
-class SlowEquilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class SlowEquilibrium(Saved):
     """A zero of (Fbar_Omega, Fbar_k) with the eigenvalues [1/s] of the slow flow there, per unit eps."""
 
     Omega: float

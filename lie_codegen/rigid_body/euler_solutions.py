@@ -111,8 +111,8 @@ def solve_actual(flow: EulerAverage, omega0: ArrayLike, t: ArrayLike, eps: float
     return motion.at(times)
 
 
-@dataclass(frozen=True)
-class ExplicitSolution:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExplicitSolution(Saved):
     """(32): the algebraic approximation for pure inertia change.
 
         r1 = r0 (j1 / j2)^(1/4),  k^2 = r0^2 g31 g32 / (1 - r0^2 g12),  Omega = L sqrt(1 - r0^2 g12) / I3.

@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import Any
 
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
@@ -26,8 +27,8 @@ _RATES = sp.symbols("w1 w2 w3", real=True)
 _ACCELERATIONS = sp.symbols("dw1 dw2 dw3", real=True)
 
 
-@dataclass(frozen=True)
-class EulerPerturbation:
+@dataclass(frozen=True, eq=False, repr=False)
+class EulerPerturbation(Saved):
     """A body and the perturbing accelerations of (3).
 
     Attributes:

@@ -15,6 +15,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body import euler_kernels
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody, principal_body
 from lie_codegen.runtime.broadcast import broadcast_call
@@ -39,8 +40,8 @@ class SlowState(NamedTuple):
     phi: Array
 
 
-@dataclass(frozen=True)
-class FreeRigidBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class FreeRigidBody(Saved):
     """A rigid body in the coordinates (Omega, k, phi) of its torque-free motions.
 
         omega = (s1 G13 k Omega cn, s2 G23 k Omega sn, s3 Omega dn) at u = 4 K(k) phi            (9), (10)

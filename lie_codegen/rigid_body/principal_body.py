@@ -18,6 +18,7 @@ from itertools import pairwise
 from typing import Any, TypeAlias
 
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, quantity
 from lie_codegen.on_demand import sympy as sp
 
@@ -29,8 +30,8 @@ SYMMETRY_MARGIN = 1e-3
 Triple: TypeAlias = "tuple[sp.Expr, sp.Expr, sp.Expr]"
 
 
-@dataclass(frozen=True)
-class PrincipalBody:
+@dataclass(frozen=True, eq=False, repr=False)
+class PrincipalBody(Saved):
     """Principal moments of inertia in the user's axes, and the choice of the paper's axes and signs.
 
     Attributes:

@@ -11,10 +11,11 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 
 
-@dataclass(frozen=True)
-class Cone:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cone(Saved):
     """Attitude exclusion: a body axis stays at least half_angle away from a direction of space, (X axis) . direction <= cos.
 
     Attributes:
@@ -44,8 +45,8 @@ class Cone:
         return np.asarray(p[6] - (X[:, :3, :3] @ p[:3]) @ p[3:6])
 
 
-@dataclass(frozen=True)
-class Ball:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ball(Saved):
     """An obstacle: the position, the last column of X, stays out of a ball (a disc on SE(2)).
 
     Attributes:

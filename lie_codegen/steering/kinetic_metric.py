@@ -23,14 +23,14 @@ from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
-from lie_codegen.values import Value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KineticMetric(Value):
+class KineticMetric(Saved):
     """What `kinetic_energy_metric` makes.
 
     Attributes:

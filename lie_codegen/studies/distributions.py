@@ -16,10 +16,10 @@ from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 
-class Distribution(Value, ABC):
+class Distribution(Saved, ABC):
     """Base of what an input is drawn from.
 
     `slots` uniform numbers in (0, 1) make one value; `draw` makes many. Subclasses are frozen records of plain data.

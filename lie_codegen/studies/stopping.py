@@ -8,11 +8,11 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Quantile(Value):
+class Quantile(Saved):
     """Stop when the confidence interval of a quantile of an output is narrower than `width`.
 
     The interval lies between two order statistics (Conover, Practical Nonparametric Statistics, section 3.2): the number of samples below

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.kernel.parameter import refuse_input
+from lie_codegen.kernel.saved import Saved
 
 
-@dataclass(frozen=True)
-class Allocation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Allocation(Saved):
     """Thrusters and how they share a force.
 
     Attributes:

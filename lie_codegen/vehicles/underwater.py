@@ -31,14 +31,15 @@ from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, cross, dot, matvec, minus, number, plus, scaled
 from lie_codegen.kernel.parameter import INPUT, Parameter, input_ports, is_input, sample_inputs, values_of
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import sympy as sp
 
 _RIGID = ("w1", "w2", "w3", "v1", "v2", "v3")
 
 
-@dataclass(frozen=True)
-class UnderwaterVehicle:
+@dataclass(frozen=True, eq=False, repr=False)
+class UnderwaterVehicle(Saved):
     """A vehicle; made by `underwater_vehicle`.
 
     Attributes:

@@ -14,7 +14,7 @@ from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 #: The iteration converges linearly at worst, with the square of the spread of the data as its rate: this is far beyond.
 _MOST_STEPS = 200
@@ -24,7 +24,7 @@ _ROUNDING = 1e-11
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mean(Value):
+class Mean(Saved):
     """The exponential barycentre of elements of a group.
 
     Attributes:

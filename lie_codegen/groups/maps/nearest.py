@@ -24,6 +24,7 @@ from lie_codegen.errors import InputError, NotFiniteError, NotOnGroupError, Shap
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.catalogue_load import group as load_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import scipy
 
 _STEPS = 200
@@ -35,8 +36,8 @@ _FLAT = 1e-7
 _SINGULAR = 1e6
 
 
-@dataclass(frozen=True, eq=False)
-class Nearest:
+@dataclass(frozen=True, eq=False, repr=False)
+class Nearest(Saved):
     """An element of a group, and how far the matrix given was from it.
 
     Attributes:
@@ -46,18 +47,6 @@ class Nearest:
 
     X: Array
     distance: Any
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Nearest):
-            return NotImplemented
-        return np.array_equal(self.X, other.X) and np.array_equal(self.distance, other.distance)
-
-    def __hash__(self) -> int:
-        return hash((self.X.tobytes(), np.asarray(self.distance).tobytes()))
-
-    def __repr__(self) -> str:
-        shape = " x ".join(map(str, self.X.shape))
-        return f"Nearest(X: {shape}, distance: {np.max(self.distance):.3g})"
 
 
 def nearest(group: MatrixGroup | str | Path, X: ArrayLike) -> Nearest:

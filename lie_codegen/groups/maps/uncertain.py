@@ -17,14 +17,14 @@ from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.covariance import compounded, flowed, transported
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.values import Value
+from lie_codegen.kernel.saved import Saved
 
 _MOST_STEPS = 50
 _SETTLED = 1e-13
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Uncertain(Value):
+class Uncertain(Saved):
     """The random element X exp(hat xi), xi ~ (mean_shift, covariance): the noise is on the body side.
 
     Attributes:

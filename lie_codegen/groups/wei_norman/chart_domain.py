@@ -15,6 +15,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.chart_end import End, chart_end, escaping_input
 from lie_codegen.groups.wei_norman.matrix import WeiNorman, wei_norman
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import scipy
 from lie_codegen.on_demand import sympy as sp
 
@@ -24,8 +25,8 @@ _MANY_TERMS = 3
 _RAYS, _POINTS, _REACH = 60, 30, 3.0
 
 
-@dataclass(frozen=True)
-class ChartDomain:
+@dataclass(frozen=True, eq=False, repr=False)
+class ChartDomain(Saved):
     """The chart of X = exp(g_1 A_1) ... exp(g_n A_n) around g = 0.
 
     Attributes:

@@ -24,11 +24,12 @@ from lie_codegen.groups.wei_norman.ring_solve import combination, dense, determi
 from lie_codegen.groups.wei_norman.trigonometric_ring import Element, TrigonometricRing
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.block_solve import SparseMatrix, blocks_of
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 
 
-@dataclass(frozen=True)
-class WeiNorman:
+@dataclass(frozen=True, eq=False, repr=False)
+class WeiNorman(Saved):
     """g' = M(g) u, exact; each part is computed when it is first read.
 
     Attributes:

@@ -17,6 +17,7 @@ from lie_codegen.groups.iwasawa import iwasawa
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.chart_domain import ChartDomain, chart_domain, is_generic
 from lie_codegen.groups.wei_norman.chart_end import combination_text, is_compact
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 
 _RANK = {"never": 0, "walls": 1, "either": 2, "escape": 3}
@@ -27,8 +28,8 @@ _LONGEST = 2000
 _ROTATIONS = 3
 
 
-@dataclass(frozen=True)
-class WeiNormanOrder:
+@dataclass(frozen=True, eq=False, repr=False)
+class WeiNormanOrder(Saved):
     """A recommended basis order for product-of-exponentials coordinates.
 
     Attributes:

@@ -14,6 +14,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.runge_kutta import propagators
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.steering.shooting.bracket_lengths import bracket_lengths
 
 _ORDER = 12
@@ -23,8 +24,8 @@ _RESOLVED = 1e-8
 _NOISE = 1e-12
 
 
-@dataclass(frozen=True)
-class Extremal:
+@dataclass(frozen=True, eq=False, repr=False)
+class Extremal(Saved):
     """The extremal of the costate mu0 for the cost int sum_i w_i u_i^2 in unit time.
 
     Attributes:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lie_codegen.arrays import Array
+from lie_codegen.kernel.saved import Saved
 
 #: Values of `Extremals.status`, as in the generated header.
 NOTHING_FOUND, SOLVED, NOT_CONVERGED = 0, 1, 2
 
 
-@dataclass(frozen=True)
-class Extremals:
+@dataclass(frozen=True, eq=False, repr=False)
+class Extremals(Saved):
     """The cheapest extremal found for each of K targets, in unit time.
 
     Attributes:

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.values import Value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WheeledBody(Value):
+class WheeledBody(Saved):
     """A body with momentum wheels on a group of rotations.
 
     Attributes:

@@ -16,18 +16,18 @@ from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.element_pattern import packed_size
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.steering.wheels.body import WheeledBody
 from lie_codegen.steering.wheels.kernels import arguments_of, wheel_speed_step, wheel_torque_step
-from lie_codegen.values import Value
 
 #: Steps at most, and |h w| at most: there the exponential of a step is exact to rounding.
 _MOST_STEPS, _LARGEST_MOVE = 2**20, 0.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WheelRun(Value):
+class WheelRun(Saved):
     """A motion with wheels; of N runs with an axis of runs behind that of the times.
 
     Attributes:

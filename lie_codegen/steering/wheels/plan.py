@@ -17,6 +17,7 @@ from lie_codegen.errors import InputError, SteeringInputError
 from lie_codegen.groups.build import build
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.steering.front import steer
@@ -34,7 +35,7 @@ _POINTS = 401
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WheelPlan(Value):
+class WheelPlan(Saved):
     """A manoeuvre in wheel speeds.
 
     Attributes:
