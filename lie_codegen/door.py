@@ -11,10 +11,11 @@ from __future__ import annotations
 import enum
 import functools
 import sys
+import threading
 import types
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import lazy_loader
 
@@ -36,6 +37,8 @@ _INSIDE = {
     "zarr",
 }
 _LONGEST = 300
+
+Result = TypeVar("Result")
 
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -93,19 +96,46 @@ def warnings_given() -> int:
     return _given_warnings[0]
 
 
-def warn_caller(message: str, category: type[Warning]) -> None:
-    """Warn at the line of the user's code that led here, however many functions of ours lie between (a stacklevel would have to count them).
+#: A line of code: its file, its number, the globals of its module.
+_Place: TypeAlias = tuple[str, int, dict[str, Any]]
+_behalf = threading.local()
 
-    The nearest frame that is not ours, of Python's own library or of what we compute with; the outermost if there is none.
-    """
+
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warn at the line of the user's code that led here, however many functions of ours lie between (a stacklevel would have to count them)."""
     _given_warnings[0] += 1
+    file, line, there = _place_of_caller()
+    registry = there.setdefault("__warningregistry__", {})
+    warnings.warn_explicit(message, category, file, line, str(there.get("__name__", "<string>")), registry)
+
+
+def on_behalf(function: Callable[..., Result]) -> Callable[..., Result]:
+    """The function for a thread of ours, which holds no frame of the user's: it warns at the line that led to this call."""
+    place = _place_of_caller()
+
+    @functools.wraps(function)
+    def run(*args: Any, **named: Any) -> Result:
+        _behalf.place = place
+        try:
+            return function(*args, **named)
+        finally:  # the thread of a pool serves others after this
+            del _behalf.place
+
+    return run
+
+
+def _place_of_caller() -> _Place:
+    """The nearest line that is not ours, of Python's own library or of what we compute with; that which started a thread of ours.
+
+    The outermost if there is none.
+    """
     frame = sys._getframe(1)
     while _belongs_inside(frame) and frame.f_back is not None:
         frame = frame.f_back
-    there = frame.f_globals
-    registry = there.setdefault("__warningregistry__", {})
-    module = str(there.get("__name__", "<string>"))
-    warnings.warn_explicit(message, category, frame.f_code.co_filename, frame.f_lineno, module, registry)
+    if _belongs_inside(frame) and hasattr(_behalf, "place"):
+        place: _Place = _behalf.place
+        return place
+    return frame.f_code.co_filename, frame.f_lineno, frame.f_globals
 
 
 def _is_inside(error: Exception) -> bool:

@@ -13,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lie_codegen.door import on_behalf
 from lie_codegen.groups.prebuilt import Prebuilt, find_prebuilt
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.build import build_sources, interpreted
@@ -147,7 +148,7 @@ class GroupLibrary(Library):
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(max_workers=1 + (os.cpu_count() or 1)) as pool:
-            for made in [pool.submit(getattr, self, name) for name in wanted]:
+            for made in [pool.submit(on_behalf(getattr), self, name) for name in wanted]:
                 made.result()
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.templates import template_folder
+from lie_codegen.door import on_behalf
 from lie_codegen.errors import CacheError, CompileError, CompilerStoppedError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import note_not_loaded, usable_folder
@@ -47,7 +48,7 @@ def prepare_extension() -> None:
     """Have it found, or compiled, beside what the caller does; numpy is not imported."""
     with _lock:
         if is_wanted() and not _beside:
-            _beside.append(threading.Thread(target=_find_or_compile))
+            _beside.append(threading.Thread(target=on_behalf(_find_or_compile)))
             _beside[0].start()
 
 

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
+from lie_codegen.door import on_behalf
 from lie_codegen.errors import InputError
 from lie_codegen.identifiers import shown
 
@@ -62,9 +63,9 @@ def share_out(work: Callable[[int, int], Part], count: int, threads: Any, least:
             done.append(work(first, last))
         return done
 
-    starts = range(0, count, size)
+    starts, share_on_behalf = range(0, count, size), on_behalf(share)
     with ThreadPoolExecutor(len(starts)) as pool:
-        waiting = [pool.submit(share, start) for start in starts]
+        waiting = [pool.submit(share_on_behalf, start) for start in starts]
         try:
             return [part for done in waiting for part in done.result()]
         finally:  # Ctrl-C comes to the thread that waits here: the others stop behind the piece that they are at
@@ -100,7 +101,7 @@ def interruptible(work: Callable[[], Part]) -> Part:
         except BaseException as error:
             failed.append(error)
 
-    worker = threading.Thread(target=run, daemon=True)
+    worker = threading.Thread(target=on_behalf(run), daemon=True)
     worker.start()
     worker.join()
     if failed:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import on_behalf
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.runtime.digests import package_digest
 from lie_codegen.studies.distributions import Choice, Grid
@@ -223,7 +224,7 @@ class _Work:
 
     def beside(self) -> None:
         """Returns at once."""
-        self._thread = threading.Thread(target=self._caught, daemon=True)
+        self._thread = threading.Thread(target=on_behalf(self._caught), daemon=True)
         self._thread.start()
 
     def _caught(self) -> None:

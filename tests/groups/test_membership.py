@@ -16,21 +16,22 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 NAMES = (*lc.group_names(), "so5", "su4", "so_2_2", "sl4", "gl3", "sp6", "se4")
 
 
-def representations() -> list[MatrixGroup]:
-    rng = np.random.default_rng(5)
-    return [
-        generators.spin_group(2),
-        generators.spin_group(3),
-        generators.special_linear_complex(),
-        generators.unitary_group(2),
-        generators.real_double(lc.group("su2")),
-        generators.generic_basis(lc.group("se3"), rng),
-        generators.generic_basis(lc.group("so31"), rng),
-        generators.generic_basis(lc.group("sl2"), rng, scale=100),
-    ]
+REPRESENTATIONS = {
+    "spin3": lambda: generators.spin_group(2),
+    "spin4": lambda: generators.spin_group(3),
+    "sl2c": generators.special_linear_complex,
+    "u2": lambda: generators.unitary_group(2),
+    "su2_real": lambda: generators.real_double(lc.group("su2")),
+    "se3_generic": lambda: generators.generic_basis(lc.group("se3"), np.random.default_rng(5)),
+    "so31_generic": lambda: generators.generic_basis(lc.group("so31"), np.random.default_rng(5)),
+    "sl2_scaled": lambda: generators.generic_basis(lc.group("sl2"), np.random.default_rng(5), scale=100),
+}
 
 
-GROUPS = [lc.group(name) for name in NAMES] + representations()
+@pytest.fixture(params=(*NAMES, *REPRESENTATIONS))
+def group(request: pytest.FixtureRequest) -> MatrixGroup:
+    """Made when its test runs: at the level of the module every worker of every run would make them all."""
+    return REPRESENTATIONS[request.param]() if request.param in REPRESENTATIONS else lc.group(request.param)
 
 
 def element(group: MatrixGroup, rng: np.random.Generator, size: float = 1.0) -> np.ndarray:
@@ -39,7 +40,6 @@ def element(group: MatrixGroup, rng: np.random.Generator, size: float = 1.0) -> 
     return scipy.linalg.expm(A * size / max(1.0, np.linalg.norm(A, 2)))
 
 
-@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
 def test_the_defect_is_rounding_on_the_group_and_linear_in_the_distance(group: MatrixGroup) -> None:
     rng = np.random.default_rng(1)
     for _ in range(5):
@@ -82,7 +82,6 @@ def test_conditions_are_as_few_as_cut_the_group_out() -> None:
     assert membership(generators.spin_group(3)).normaliser
 
 
-@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
 def test_renormalising_squares_the_error_and_leaves_the_group_alone(group: MatrixGroup) -> None:
     rng = np.random.default_rng(3)
     X = element(group, rng)
@@ -120,7 +119,6 @@ def test_published_nearest_elements() -> None:
     np.testing.assert_allclose(near.X[0], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
 def test_the_nearest_element_is_on_the_group_and_the_rest_is_normal_to_it(group: MatrixGroup) -> None:
     rng = np.random.default_rng(6)
     X = element(group, rng)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 import lie_codegen as lc
+from lie_codegen.door import on_behalf, warn_caller
 from lie_codegen.errors import (
     AssumptionWarning,
     DegradedWarning,
@@ -20,8 +23,10 @@ from lie_codegen.errors import (
     SlowWarning,
     SpreadWarning,
 )
+from lie_codegen.groups.group_library import GroupLibrary
 from lie_codegen.runtime.compiler import warn_no_compiler
 from lie_codegen.runtime.degraded import warn_degraded
+from lie_codegen.runtime.threads import interruptible
 
 PACKAGE = Path(lc.__file__).parent
 
@@ -47,6 +52,38 @@ def test_the_line_of_the_caller_is_named(category: type[Warning], call: Callable
     place = next(each for each in caught if each.category is category)
     assert place.filename == __file__
     assert place.lineno == inspect.getsourcelines(call)[1]
+
+
+def _pool_of_ours(warn: Callable[[], None]) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(on_behalf(warn)).result()
+
+
+def _threads_in_a_thread(warn: Callable[[], None]) -> None:
+    _pool_of_ours(partial(_pool_of_ours, warn))
+
+
+def _compiled_of_a_group(warn: Callable[[], None]) -> None:
+    library = lc.build("so3")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(GroupLibrary, "__getattr__", lambda library, name: warn())
+        library.compile(["exp"])
+
+
+THREADS = {
+    "call": lambda warn: interruptible(warn),
+    "pool": lambda warn: _pool_of_ours(warn),
+    "nested": lambda warn: _threads_in_a_thread(warn),
+    "group": lambda warn: _compiled_of_a_group(warn),
+}
+
+
+@pytest.mark.parametrize("call", THREADS.values(), ids=list(THREADS))
+def test_a_thread_of_ours_names_the_line_that_started_it(call: Callable[[Callable[[], None]], None]) -> None:
+    """No frame of such a thread is the user's: without the line that is carried there the warning named threading.py."""
+    with pytest.warns(DegradedWarning) as caught:
+        call(partial(warn_caller, "slower", DegradedWarning))
+    assert {each.filename for each in caught if each.category is DegradedWarning} == {__file__}
 
 
 def test_no_module_warns_past_the_door() -> None:

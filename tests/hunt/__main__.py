@@ -89,9 +89,9 @@ def main() -> int:
                 tried, found = part()
                 rows.append((what, tried, len(found), time.perf_counter() - began))
                 finds += found
-                print(f"{what}: {tried:,} tried, {len(found)} found", flush=True)  # noqa: T201
+                print(f"{what}: {tried:,} tried, {len(found)} found", *found, sep="\n", flush=True)  # noqa: T201
     text = table(rows)
-    print(text, *finds, sep="\n")  # noqa: T201
+    print(text)  # noqa: T201
     if asked.write:
         head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
         tail = rest.partition(END)[2]

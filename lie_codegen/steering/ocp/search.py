@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import on_behalf
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.steering.ocp.machine_base import EXACT_AT_ONCE, GAUSS_NEWTON, Machine
 from lie_codegen.steering.ocp.plan import OptimalPlan
@@ -92,11 +93,12 @@ class Search:
             for space in spaces:
                 run(space)
             return spaces
+        run_on_behalf = on_behalf(run)
         # compiled code hears no signal: it runs beside the thread that does, which tells it to stop
         with ThreadPoolExecutor(max(1, min(lanes, len(spaces)))) as pool:
             try:
                 # handing out thousands of starts takes a while too: the key may be pressed in the midst of it
-                for each in [pool.submit(run, space) for space in spaces]:
+                for each in [pool.submit(run_on_behalf, space) for space in spaces]:
                     each.result()
             except BaseException:
                 for space in spaces:

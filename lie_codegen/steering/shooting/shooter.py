@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.algebra.controllability import control_indices, require_controllable
 from lie_codegen.arrays import Array
+from lie_codegen.door import on_behalf
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -71,7 +72,7 @@ class Shooter:
             return only
         chunks = np.array_split(elements, min(threads, len(elements)))
         with ThreadPoolExecutor(len(chunks)) as pool:
-            parts = list(pool.map(lambda chunk: self._machine.solve(chunk, w, count), chunks))
+            parts = list(pool.map(on_behalf(lambda chunk: self._machine.solve(chunk, w, count)), chunks))
         names = Extremals.__dataclass_fields__
         return Extremals(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
