@@ -7,11 +7,14 @@ has no others.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
 
 from lie_codegen.groups.catalogue_load import group
+from lie_codegen.runtime.child import child_environment
 from lie_codegen.steering.ocp.front import ocp
 from lie_codegen.steering.ocp.problem import OptimalControlProblem
 
@@ -101,3 +104,16 @@ def crocoddyl_solver() -> Any:
         return solver
 
     return solve
+
+
+def survives() -> None:
+    """Solves it once in a process of its own: wheels of crocoddyl and pinocchio that do not fit each other have ended ours.
+
+    Raises:
+        RuntimeError: the process died, and of what.
+    """
+    command = [sys.executable, "-c", f"from {__name__} import crocoddyl_solver; crocoddyl_solver()()"]
+    done = subprocess.run(command, env=child_environment(), capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = done.stderr.strip().splitlines()
+        raise RuntimeError(said[-1] if done.returncode > 0 and said else f"it died of signal {-done.returncode}")

@@ -57,11 +57,14 @@ def _steering(only: str, json: bool) -> None:
 
 
 def _control(json: bool) -> None:
-    from lie_codegen.benchmarks.open_control import bench_control, table
+    from lie_codegen.benchmarks.open_claims import table
+    from lie_codegen.benchmarks.open_control import bench_control
 
     with progress("bench control") as report:
-        rows = bench_control(say=report)
-    emit(table(rows), {"rows": [asdict(row) for row in rows]}, json)
+        rows, missed = bench_control(say=report)
+    emit(table(rows, missed), {"rows": [asdict(row) for row in rows], "missed": missed}, json)
+    if missed:
+        raise typer.Exit(1)
 
 
 def _propagate(json: bool) -> None:

@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 
-from lie_codegen.benchmarks.open_control import _rotor_rows, table
+from lie_codegen.benchmarks.open_claims import (
+    BOX_FDDP,
+    FATROP,
+    FATROP_COMPILED,
+    ITERATION,
+    OURS,
+    ROTORS,
+    SAMPLE,
+    ControlRow,
+    disagreement,
+    missed,
+    table,
+)
+from lie_codegen.benchmarks.open_control import _rotor_rows
 from lie_codegen.benchmarks.open_crocoddyl import HOVER, TARGET, rotors
 from lie_codegen.benchmarks.open_quadrotor import HIGH, LOW, program, quadrotor, tasks
 
@@ -17,19 +30,38 @@ def test_our_optimum_is_a_point_of_the_peers_program_with_our_cost() -> None:
     task = tasks(1, 0)[0]
     plan = quadrotor().solve(target=task[:3], cyl=task[3:])
     nlp, lower, upper, limits, equalities = program()
-    states = np.hstack([plan.X[:, :3, :3].reshape(-1, 9), plan.X[:, :3, 3], plan.z])
-    x = np.concatenate([np.hstack([states[:-1], plan.u]).ravel(), states[-1]])
-    f, g = ca.Function("program", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]])(x, task)
-    assert float(f) == pytest.approx(plan.cost, rel=1e-12)
-    g = np.array(g).ravel()
-    assert np.all(g >= limits[0] - 1e-9)
-    assert np.all(g <= limits[1] + 1e-8)
-    assert np.all(x >= lower)
-    assert np.all(x <= upper)
-    assert len(equalities) == len(g)
-    assert np.max(np.abs(g[np.array(equalities)])) < 1e-10
+    assert disagreement(plan, task, nlp, limits) == ""
+    assert "cost" in disagreement(plan, task, {**nlp, "f": 1.01 * nlp["f"]}, limits)
+    assert "misses" in disagreement(plan, task, {**nlp, "g": nlp["g"] + 1e-5}, limits)
+    assert len(equalities) == len(limits[0]) == nlp["g"].numel()
+    assert len(lower) == len(upper) == nlp["x"].numel()
     assert np.all(plan.u >= LOW)
     assert np.all(plan.u <= HIGH)
+
+
+def test_what_is_stated_and_does_not_hold_is_said() -> None:
+    rows = [
+        ControlRow(OURS, 20, 20, 20, 4.0, 5.0, 1.0, 20.0),
+        ControlRow(FATROP, 20, 20, 20, 140.0, 150.0, 35.0, 30.0),
+        ControlRow(FATROP_COMPILED, note="no C compiler"),
+        ControlRow(SAMPLE, 9, 9, 9, 0.1, 0.2),
+        ControlRow(ROTORS, 1, 1, 1, 8.0, 9.0, 1.0, 20.0, 3.024),
+        ControlRow(BOX_FDDP, 1, 1, 1, 80.0, 90.0, 10.0, 20.0, 3.026),
+        ControlRow(ITERATION, 1, 1, 1, 4.0, 4.0, 10.0, 1.0),
+    ]
+    assert missed(rows) == []
+    worse = [
+        replace(rows[0], solved=19, median_ms=6.0),
+        replace(rows[1], over_ours=29.0),
+        rows[2],
+        replace(rows[3], median_ms=0.4),
+        rows[4],
+        replace(rows[5], cost=3.05),
+        replace(rows[6], over_ours=4.0),
+    ]
+    said = missed(worse)
+    assert len(said) == 6
+    assert all("missed: " + each in table(worse, said) for each in said)
 
 
 def test_tasks_are_seeded_and_clear_of_their_cylinders() -> None:
