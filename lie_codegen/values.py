@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping, Sequence
-from dataclasses import Field, fields, is_dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
 from typing import Any, ClassVar
 
@@ -27,7 +27,7 @@ class Value:
 
     def __getstate__(self) -> dict[str, Any]:
         kept = (*(each.name for each in fields(self)), "definition")  # of a factory's record, beside its fields
-        return {name: vars(self)[name] for name in kept if name in vars(self)}
+        return {name: getattr(self, name) for name in kept if name in vars(self)}
 
     def __eq__(self, other: object) -> bool:
         if self is other:
@@ -48,6 +48,48 @@ class Value:
         if len(lines) > _LINES - 2:
             lines = [*lines[: _LINES - 3], f"    and {len(lines) - _LINES + 3} more"]
         return "\n".join([f"{type(self).__name__}(", *lines, ")"])
+
+
+def settle(record: Any, **kept: Any) -> None:
+    """Fields of a frozen record in the one form in which they are kept: for its own `__post_init__`, and nobody else.
+
+    The one place that goes round what frozen refuses; a record that is made never changes.
+    """
+    for name, value in kept.items():
+        object.__setattr__(record, name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class Later:
+    """A field's value that is made when it is first asked for; see `Deferred`."""
+
+    make: Callable[[], Any]
+
+
+class Deferred:
+    """A field of a Value that may be given as a `Later`: whoever asks for it gets what that makes, made once.
+
+    A data descriptor in the place of the field's default, which a dataclass asks for as the class's own attribute.
+    """
+
+    def __init__(self, *default: Any) -> None:
+        self._default = default
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, owner: Any, kind: type | None = None) -> Any:
+        if owner is None:
+            if not self._default:
+                raise AttributeError(f"the field {self._name} has no default")
+            return self._default[0]
+        value = vars(owner)[self._name]
+        if isinstance(value, Later):
+            value = vars(owner)[self._name] = value.make()
+        return value
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        vars(owner)[self._name] = value
 
 
 def same(a: Any, b: Any) -> bool:

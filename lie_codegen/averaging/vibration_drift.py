@@ -23,6 +23,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.values import settle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,8 +42,7 @@ class VibrationLine(Saved):
     def __post_init__(self) -> None:
         if not (np.isfinite(self.omega) and self.omega > 0):
             raise InputError(f"VibrationLine: omega must be positive, got {self.omega}")
-        object.__setattr__(self, "cosine", tuple(map(float, self.cosine)))
-        object.__setattr__(self, "sine", tuple(map(float, self.sine)))
+        settle(self, cosine=tuple(map(float, self.cosine)), sine=tuple(map(float, self.sine)))
         if len(self.cosine) != len(self.sine):
             raise ShapeError(f"VibrationLine: {len(self.cosine)} cosine and {len(self.sine)} sine amplitudes")
         if not np.all(np.isfinite([*self.cosine, *self.sine])):

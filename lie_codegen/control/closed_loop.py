@@ -31,6 +31,7 @@ from lie_codegen.identifiers import shown, unknown_keywords
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.patience import shows_progress
+from lie_codegen.values import settle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,7 +119,7 @@ class ClosedLoop(Saved):
         return made
 
     def _made_by(self, making: LoopMaking) -> ClosedLoop:
-        object.__setattr__(self, "_made", making)  # beside the fields: neither == nor a pickle sees it
+        settle(self, _made=making)  # beside the fields: neither == nor a pickle sees it
         return self
 
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.budget import current_budget
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -24,6 +26,8 @@ from lie_codegen.kernel.matrix_formula import MatrixLog, matrix_formula, scalar_
 from lie_codegen.kernel.parameter import is_input
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.runtime.records import find_record, source_of, store_record
+from lie_codegen.values import Deferred, Later
 
 #: Transport maps that have a name: nu = Ad_{X^-1 X_d} xi_d, and nu = xi_d.
 NAMED_TRANSPORTS = ("right", "left")
@@ -127,10 +131,10 @@ class ErrorFunction(Saved):
 
     name: str
     group: MatrixGroup
-    phi: sp.Expr
+    phi: sp.Expr = Deferred()
     transport: str = "right"
-    tau: sp.ImmutableMatrix | None = None
-    P: sp.ImmutableMatrix | None = None
+    tau: sp.ImmutableMatrix | None = Deferred(None)
+    P: sp.ImmutableMatrix | None = Deferred(None)
     constant: float | None = None
     description: str = field(default="", compare=False)
     inputs: tuple[Port, ...] = ()
@@ -170,20 +174,30 @@ def error_function(
         ExpressionError: a text outside the grammar, with the column.
     """
     group = as_group(group, "error_function")
-    symbols = ErrorSymbols(group)
-    values = _parameters(parameters or {}, symbols)
-    expression = _phi(phi, symbols, values)
-    tau, P, kind = _transport(transport, symbols, values)
+    given = dict(parameters or {})
+
+    @cache
+    def read() -> tuple[sp.Expr, sp.ImmutableMatrix | None, sp.ImmutableMatrix | None]:
+        symbols = ErrorSymbols(group)
+        values = _parameters(given, symbols)
+        return _phi(phi, symbols, values), *_transport(transport, symbols, values)
+
+    # texts that were found in order before are read when a formula is asked for: laws are known by their definitions
+    source = source_of(group.definition_text, phi, transport, given, repr(current_budget()))
+    if source is None or find_record("error function", source) is None:
+        read()
+        if source is not None:
+            store_record("error function", source, True)
     inputs = tuple(
-        Port(key, (), description="of the error function", any_sign=True)
-        for key in values
-        if is_input((parameters or {})[key])
+        Port(key, (), description="of the error function", any_sign=True) for key in given if is_input(given[key])
     )
     if inputs and constant is not None:
         raise InputError(
             f"error_function: constant = {constant:g} is of one phi, and {', '.join(port.name for port in inputs)} can be any: leave constant away"
         )
-    return ErrorFunction(name, group, expression, kind, tau, P, constant, inputs=inputs)
+    kind = {"tau": "element", "P": "matrix"}[next(iter(transport))] if isinstance(transport, Mapping) else transport
+    places = (Later(lambda: read()[0]), kind, Later(lambda: read()[1]), Later(lambda: read()[2]))
+    return ErrorFunction(name, group, *places, constant, inputs=inputs)
 
 
 def _parameters(parameters: Mapping[str, Any], symbols: ErrorSymbols) -> dict[str, Any]:
@@ -228,13 +242,14 @@ def _smooth(phi: sp.Expr) -> sp.Expr:
 
 def _transport(
     transport: Any, symbols: ErrorSymbols, values: Mapping[str, Any]
-) -> tuple[sp.ImmutableMatrix | None, sp.ImmutableMatrix | None, str]:
+) -> tuple[sp.ImmutableMatrix | None, sp.ImmutableMatrix | None]:
+    """(tau, P)."""
     if transport in NAMED_TRANSPORTS:
-        return None, None, str(transport)
+        return None, None
     if isinstance(transport, Mapping) and set(transport) == {"tau"}:
-        return _matrix("tau", transport["tau"], symbols, values, symbols.X.rows), None, "element"
+        return _matrix("tau", transport["tau"], symbols, values, symbols.X.rows), None
     if isinstance(transport, Mapping) and set(transport) == {"P"}:
-        return None, _matrix("P", transport["P"], symbols, values, symbols.group.dim), "matrix"
+        return None, _matrix("P", transport["P"], symbols, values, symbols.group.dim)
     raise InputError(
         f"transport {transport!r} is not known: give 'right' (Ad of X^-1 X_d), 'left' (the identity), "
         "{'tau': a matrix of the group} or {'P': an n x n matrix}"

@@ -25,7 +25,7 @@ def loop_system(run: Run) -> System:
     """The loop as the pair integrates it."""
     loop, library = run.loop, run.library
     moves = moves_of(loop)
-    reach = min(reach_of(move.group, closed=move.derivation.matrix_pattern is not None) for move in moves)
+    reach = min(reach_of(move.group, closed=move.derivation.closed_exponential) for move in moves)
     names = [port.name for port in library.loop_rate.inputs[3:]]
     turns = sum(move.group.dim for move in moves)
     return System(library.loop_rate, library.loop_settle, turns, reach, tuple(run.numbers[name] for name in names))

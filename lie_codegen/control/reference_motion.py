@@ -10,19 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.errors import InputError
+from lie_codegen.exact.budget import current_budget
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.runtime.records import find_record, source_of, store_record
+from lie_codegen.values import Deferred, Later
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,7 +39,7 @@ class FormulaReference(Saved):
     """
 
     group: MatrixGroup
-    g: tuple[sp.Expr, ...]
+    g: tuple[sp.Expr, ...] = Deferred()  # type: ignore[assignment]
     start: NDArray[Any] | None = None
 
     @cached_property
@@ -101,9 +104,18 @@ def formula_reference(group: MatrixGroup, coordinates: Sequence[Any], *, start: 
     """
     if isinstance(coordinates, str) or len(coordinates) != group.dim:
         raise InputError(f"a reference on {group.name} needs {group.dim} formulas, for {', '.join(group.labels)}")
-    return FormulaReference(
-        group, tuple(formula_of_time(entry) for entry in coordinates), None if start is None else np.array(start)
-    )
+
+    @cache
+    def read() -> tuple[sp.Expr, ...]:
+        return tuple(formula_of_time(entry) for entry in coordinates)
+
+    # texts that were found in order before are read when a formula is asked for: its kernel is known by the texts
+    source = source_of(list(coordinates), repr(current_budget()))
+    if source is None or find_record("reference", source) is None:
+        read()
+        if source is not None:
+            store_record("reference", source, True)
+    return FormulaReference(group, Later(read), None if start is None else np.array(start))  # type: ignore[arg-type]
 
 
 def formula_of_time(entry: Any) -> sp.Expr:

@@ -198,7 +198,7 @@ def _compiled(
     rows, columns = np.array(varying_entries(group)).T
     packed = np.ascontiguousarray(X0[:, rows, columns])
     flat = packed.view(float) if group.is_complex else packed
-    closed = Move(group).derivation.matrix_pattern is not None
+    closed = Move(group).derivation.closed_exponential
     numbers = (eps[0],) if count == 1 else (eps,)
     system = System(
         library.feedback_rate, library.feedback_move, n, reach_of(group, closed=closed), tuple(map(np.asarray, numbers))

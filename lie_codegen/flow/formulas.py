@@ -2,30 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
+from lie_codegen.exact.budget import current_budget
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.expressions import ExpressionEvaluator
-from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
+from lie_codegen.kernel.formula_program import FormulaProgram, formula_program
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.signals.formula_tables import fourier_table
+from lie_codegen.runtime.formula_input import FormulaInput
+from lie_codegen.runtime.records import recalled
 from lie_codegen.signals.parametric_input import ParametricInput
 from lie_codegen.signals.periodic_input import PeriodicInput
 
 
-def formula_input(
-    group: MatrixGroup, texts: Sequence[str]
-) -> PeriodicInput | ParametricInput | Callable[[Any], NDArray[np.float64]]:
-    """u(t) -> (n,), vectorised, from one formula of t for each basis element.
+@dataclass(frozen=True)
+class TextInput:
+    """Formulas of t, called with (...,) times: (..., n).
 
-    Where the formulas are sums and products of sines and cosines, what compiled loops evaluate themselves: a PeriodicInput
-    if their rates are commensurate, else a ParametricInput without parameters.
+    Attributes:
+        program: the steps that evaluate them.
+        formula: what compiled loops evaluate themselves, where the formulas are sums and products of sines and cosines of any
+            rates; else None.
+    """
+
+    program: FormulaProgram
+    formula: FormulaInput | None
+
+    def __call__(self, t: ArrayLike) -> Array:
+        return self.program(t)
+
+    def as_formula(self, start: float, end: float) -> FormulaInput | None:
+        """The same at all times."""
+        return self.formula
+
+
+def formula_input(group: MatrixGroup, texts: Sequence[str]) -> TextInput:
+    """u(t) -> (n,), vectorised, from one formula of t for each basis element.
 
     Raises:
         ShapeError: not one formula for each basis element.
@@ -35,30 +52,24 @@ def formula_input(
         raise ShapeError(
             f"{group.name}: {len(texts)} formulas given, one for each of {', '.join(group.labels)} is needed"
         )
-    found = _series(texts) or _waves(texts)
-    if found is not None:
-        return found
-    t = sp.Symbol("t", real=True)
-    expressions = [parse_expression(text, {"t": t, "pi": sp.pi}, FORMULA_FUNCTIONS) for text in texts]
-
-    def u(time: Any) -> NDArray[np.float64]:
-        times = np.asarray(time, dtype=float)
-        evaluate = ExpressionEvaluator(NumpyArithmetic(), {t: times})
-        return np.stack([np.broadcast_to(evaluate(each), times.shape) for each in expressions], axis=-1).astype(float)
-
-    return u
+    # texts that were read before are known by their record, and need no SymPy
+    return recalled("formulas of time", [list(texts), repr(current_budget())], TextInput, lambda: _read(texts))
 
 
-def _waves(texts: Sequence[str]) -> ParametricInput | None:
-    """The formulas as sums of sines and cosines of any rates, None where they are none."""
-    found = ParametricInput(tuple(texts), ())
-    return None if found.waves is None else found
+def _read(texts: Sequence[str]) -> TextInput:
+    names = {"t": time_symbol(), "pi": sp.pi}
+    expressions = [parse_expression(text, names, FORMULA_FUNCTIONS) for text in texts]
+    return TextInput(formula_program(expressions, [time_symbol()]), _series(texts) or _waves(texts))
 
 
-def _series(texts: Sequence[str]) -> PeriodicInput | None:
+def _series(texts: Sequence[str]) -> FormulaInput | None:
     """The formulas as a Fourier series, None where they are none."""
     try:
-        found = PeriodicInput(tuple(texts))
+        return PeriodicInput(tuple(texts)).as_formula(0, 1)
     except InputError:
         return None
-    return None if fourier_table(found.waveform, found.dim) is None else found
+
+
+def _waves(texts: Sequence[str]) -> FormulaInput | None:
+    """The formulas as sums of sines and cosines of incommensurate rates, None where they are none."""
+    return ParametricInput(tuple(texts), ()).as_formula(0, 1)

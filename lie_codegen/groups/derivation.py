@@ -15,6 +15,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.runtime.records import find_record, store_record
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,16 @@ class GroupDerivation:
     def matrix_pattern(self) -> tuple[ColumnPattern, ...] | None:
         """Annihilating polynomials of hat(x), column by column; None where there are none of the closed kind."""
         return spectral_pattern(self.real.basis)
+
+    @cached_property
+    def closed_exponential(self) -> bool:
+        """Whether exp(hat(x)) is a closed formula of x, for there is such a pattern; known from its record where it was asked before."""
+        source = self.group.definition_text
+        known = find_record("closed exponential", source)
+        if known is None:
+            known = self.matrix_pattern is not None
+            store_record("closed exponential", source, known)
+        return bool(known)
 
     @cached_property
     def adjoint_pattern(self) -> tuple[ColumnPattern, ...] | None:

@@ -32,7 +32,7 @@ def record_definition(value: Any) -> Definition:
         record = encoded(value, arrays, type(value).__name__)
     except InputError as problem:
         raise NoDefinitionError(str(problem)) from None
-    return Definition({"kind": RECORD, "parameters": Definition({"record": _fixed(record, arrays)})})
+    return Definition({"kind": RECORD, "parameters": Definition({"record": complete(record, arrays)})})
 
 
 @makes_records
@@ -46,15 +46,15 @@ defined_record.__reads_plain_data__ = True  # type: ignore[attr-defined]
 RECORD = f"{__name__}:{defined_record.__name__}"
 
 
-def _fixed(record: Any, arrays: Mapping[str, Array]) -> Any:
-    """The record as it stands in a definition: it cannot be changed, and its arrays are in it."""
+def complete(record: Any, arrays: Mapping[str, Array]) -> Any:
+    """A record as it stands in a definition: it cannot be changed, and the arrays that `encoded` put beside it are in it."""
     if isinstance(record, list):
-        return tuple(_fixed(each, arrays) for each in record)
+        return tuple(complete(each, arrays) for each in record)
     if not isinstance(record, dict):
         return record
     if record.keys() == {"array"}:
         return Definition({"array": _written(arrays[record["array"]])})
-    return Definition({key: _fixed(each, arrays) for key, each in record.items()})
+    return Definition({key: complete(each, arrays) for key, each in record.items()})
 
 
 def _written(array: Array) -> Definition:

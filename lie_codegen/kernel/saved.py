@@ -19,7 +19,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.kernel.records import decoded, encoded
+from lie_codegen.kernel.records import complete, decoded, encoded
 from lie_codegen.values import Value
 
 FORMAT, VERSION = "lie_codegen value", 1
@@ -67,16 +67,13 @@ def load(path: str | Path) -> Any:
 
 
 def record_of(value: Any) -> Any:
-    """A value without arrays as plain JSON data, from which `value_of` makes it again.
+    """A small value as plain JSON data, its arrays in it, from which `value_of` makes it again.
 
     Raises:
-        InputError: it holds an array, or what is no data.
+        InputError: it holds what is no data.
     """
     arrays: dict[str, Array] = {}
-    record = encoded(value, arrays, type(value).__name__)
-    if arrays:
-        raise InputError(f"{type(value).__name__} holds arrays; save it to a file")
-    return record
+    return complete(encoded(value, arrays, type(value).__name__), arrays)
 
 
 def value_of(record: Any) -> Any:

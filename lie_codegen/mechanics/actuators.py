@@ -18,6 +18,7 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.values import settle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +42,7 @@ class MomentumWheels(Saved):
     transverse: Any
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "inertia", positive_inertia(self.inertia, "MomentumWheels: inertia"))
+        inertia = positive_inertia(self.inertia, "MomentumWheels: inertia")
         axes = _matrix(self.axes, "MomentumWheels: axes")
         if axes.cols != 3:
             raise ShapeError(f"MomentumWheels: axes has {axes.cols} columns; each axis has 3 components")
@@ -51,14 +52,15 @@ class MomentumWheels(Saved):
             if length == 0:
                 raise InputError(f"MomentumWheels: axis {i + 1} is zero")
             units.append([sp.radsimp(value / length) for value in axes.row(i)])
-        object.__setattr__(self, "axes", sp.ImmutableMatrix(units))
+        moments = {}
         for name in ("axial", "transverse"):
             values = tuple(_exact(value) for value in getattr(self, name))
             if len(values) != axes.rows:
                 raise ShapeError(f"MomentumWheels: {name} has {len(values)} entries for {axes.rows} wheels")
             if any(value < 0 for value in values):
                 raise InputError(f"MomentumWheels: {name} holds a negative moment of inertia")
-            object.__setattr__(self, name, values)
+            moments[name] = values
+        settle(self, inertia=inertia, axes=sp.ImmutableMatrix(units), **moments)
 
     @property
     def count(self) -> int:
@@ -130,12 +132,11 @@ class PointMassOscillator(Saved):
     inertia: Any
 
     def __post_init__(self) -> None:
-        for name in ("body_mass", "point_mass"):
-            value = _exact(getattr(self, name))
+        masses = {"body_mass": _exact(self.body_mass), "point_mass": _exact(self.point_mass)}
+        for name, value in masses.items():
             if not value > 0:
                 raise InputError(f"PointMassOscillator: {name} must be positive, got {value}")
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "inertia", positive_inertia(self.inertia, "PointMassOscillator: inertia"))
+        settle(self, inertia=positive_inertia(self.inertia, "PointMassOscillator: inertia"), **masses)
 
     @property
     def reduced_mass(self) -> sp.Expr:

@@ -6,11 +6,19 @@ A record belongs to the source of this package and the versions of what it compu
 from __future__ import annotations
 
 import contextlib
-from typing import Any
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any, TypeVar
 
+import numpy as np
+
+from lie_codegen.errors import InputError
+from lie_codegen.kernel.saved import record_of, value_of
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 from lie_codegen.runtime.digests import digest, package_digest, versions
+
+T = TypeVar("T")
 
 
 def find_record(kind: str, source: Any) -> Any:
@@ -25,6 +33,48 @@ def store_record(kind: str, source: Any, record: Any) -> None:
     if why_unusable(folder) is None:
         with contextlib.suppress(OSError):
             cache.store_note(folder, _key(kind, source), record)
+
+
+def recalled(kind: str, source: Any, of: type[T], make: Callable[[], T]) -> T:
+    """The value that `make` makes: from its record, or made and recorded.
+
+    Args:
+        kind, source: plain data that determines it.
+        of: its class, a dataclass of plain data.
+    """
+    with contextlib.suppress(InputError):
+        found = value_of(find_record(kind, source))
+        if isinstance(found, of):
+            return found
+    made = make()
+    store_record(kind, source, record_of(made))
+    return made
+
+
+def source_of(*given: Any) -> Any:
+    """Nested sequences and mappings of texts and numbers as the source of a record; None where they hold anything else.
+
+    A float is another source than the decimal it prints as: inputs take it at its binary value.
+    """
+    found = [_plain(each) for each in given]
+    return None if any(each is None for each in found) else found
+
+
+def _plain(value: Any) -> Any:
+    if value is None:
+        return ["none"]
+    if isinstance(value, bool | np.bool_):
+        return None
+    if isinstance(value, str):
+        return ["text", value]
+    if isinstance(value, float | np.floating):
+        return ["float", float(value).hex()]
+    if isinstance(value, int | Fraction | np.integer):
+        return ["exact", str(value)]
+    if isinstance(value, Mapping):
+        inside = source_of(*(each for pair in value.items() for each in pair))
+        return None if inside is None else ["mapping", *inside]
+    return source_of(*value) if isinstance(value, list | tuple | np.ndarray) else None
 
 
 def _key(kind: str, source: Any) -> str:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
+from lie_codegen.errors import ExpressionError, InputError, NotFiniteError, PeriodError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.exact.numbers import exact_number
+from lie_codegen.kernel.formula_program import formula_program
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.sampled_signal import resolve
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
@@ -73,8 +74,14 @@ def _sampled(
 
 
 def compiled(formulas: Sequence[sp.Expr]) -> Callable[[Array], Array]:
-    """(k,) -> (k, n) from formulas of t alone."""
-    functions = [sp.lambdify(time_symbol(), formula, "numpy", cse=True) for formula in formulas]
+    """(...,) -> (..., n) from formulas of t alone: a `FormulaProgram`.
+
+    SymPy knows more functions than the grammar of texts (Piecewise, Heaviside): where one stands, it makes the function itself.
+    """
+    try:
+        return formula_program(formulas, [time_symbol()])
+    except ExpressionError:
+        functions = [sp.lambdify(time_symbol(), formula, "numpy", cse=True) for formula in formulas]
 
     def evaluate(t: Array) -> Array:
         times = np.asarray(t, dtype=float)
@@ -168,6 +175,43 @@ def coefficients_of(table: Any, what: str) -> list[list[sp.Expr]]:
         return [[exact_value(value) for value in row] for row in rows_of(table)]
     except TypeError:
         raise ShapeError(f"PeriodicInput.from_fourier: {what} must be rows of n coefficients") from None
+
+
+def fourier_formulas(cosines: Any, sines: Any, mean: Any, period: Any) -> tuple[sp.Expr, ...]:
+    """mean + sum_k cosines[k-1] cos(2 pi k t / T) + sines[k-1] sin(2 pi k t / T), a formula a component.
+
+    Raises:
+        ShapeError: they do not agree in n. NotFiniteError: NaN or infinity.
+    """
+    c, s = coefficients_of(cosines, "cosines"), coefficients_of(sines, "sines")
+    m = coefficients_of([] if mean is None else [mean], "mean")
+    widths = {len(row) for table in (c, s, m) for row in table}
+    if len(widths) != 1:
+        raise ShapeError(f"PeriodicInput.from_fourier: the coefficients have {sorted(widths)} components; give one n")
+    [n] = widths
+    omega = 2 * sp.pi / period_of(period, {})
+    terms = [list(m[0]) if m else [sp.S.Zero] * n]
+    terms += [[a * sp.cos((k + 1) * omega * time_symbol()) for a in row] for k, row in enumerate(c)]
+    terms += [[b * sp.sin((k + 1) * omega * time_symbol()) for b in row] for k, row in enumerate(s)]
+    return tuple(sp.Add(*(row[i] for row in terms)) for i in range(n))
+
+
+def series_through(values: Any) -> tuple[Array, Array, Array]:
+    """Mean (n,), cosines and sines (K, n) of the trigonometric polynomial through (N, n) samples of one period.
+
+    Raises:
+        ShapeError, NotFiniteError: naming `values`.
+    """
+    samples = np.asarray(values, dtype=float)
+    if samples.ndim != 2 or len(samples) < 2:
+        raise ShapeError(f"PeriodicInput.from_samples: values has shape {samples.shape}; give (N, n) with N >= 2")
+    if not np.all(np.isfinite(samples)):
+        raise NotFiniteError("PeriodicInput.from_samples: values holds NaN or infinity")
+    spectrum = np.fft.rfft(samples, axis=0) / len(samples)
+    weights = np.full(len(spectrum) - 1, 2.0)
+    if len(samples) % 2 == 0:
+        weights[-1] = 1.0  # the highest frequency of an even number of samples stands for itself and its mirror image
+    return spectrum[0].real, weights[:, None] * spectrum[1:].real, -weights[:, None] * spectrum[1:].imag
 
 
 def rows_of(table: Any) -> list[list[Any]]:

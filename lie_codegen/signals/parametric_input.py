@@ -18,6 +18,7 @@ from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, ti
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import FormulaInput, fourier_input
+from lie_codegen.values import settle
 
 
 @dataclass(frozen=True)
@@ -64,21 +65,16 @@ class ParametricInput(Saved):
                 raise InputError(f"ParametricInput: {name!r} cannot name a parameter")
         if len(set(names)) < len(names):
             raise InputError(f"ParametricInput: parameters repeated in {', '.join(names)}")
-        object.__setattr__(self, "components", tuple(str(each) for each in self.components))
-        object.__setattr__(self, "parameters", names)
-        object.__setattr__(self, "breakpoints", tuple(sorted(float(each) for each in self.breakpoints)))
+        settle(
+            self,
+            components=tuple(str(each) for each in self.components),
+            parameters=names,
+            breakpoints=tuple(sorted(float(each) for each in self.breakpoints)),
+        )
         _ = self._formulas
         if self.period is not None:
-            object.__setattr__(self, "period", str(self.period))
+            settle(self, period=str(self.period))
             _ = self._period
-
-    def __getstate__(self) -> dict[str, Any]:
-        """The definition; what follows from it is derived again."""
-        return {name: getattr(self, name) for name in ("components", "parameters", "period", "breakpoints")}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
-            object.__setattr__(self, name, value)
 
     @property
     def dim(self) -> int:

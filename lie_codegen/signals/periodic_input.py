@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from functools import cache, cached_property
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, NotFiniteError, PeriodError, ShapeError
+from lie_codegen.errors import InputError, PeriodError, ShapeError
 from lie_codegen.exact.expression import time_symbol
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import FormulaInput
-from lie_codegen.signals.formula_tables import PieceTable, lines_between, piece_table, series_formula
+from lie_codegen.runtime.records import source_of
+from lie_codegen.signals.formula_tables import lines_between
 from lie_codegen.signals.input_formulas import (
-    coefficients_of,
     exact_value,
     formula_of,
     formula_waveform,
+    fourier_formulas,
     number_of,
     period_of,
     pieces_function,
     rows_of,
+    series_through,
     symbol_of,
 )
+from lie_codegen.signals.input_numbers import InputNumbers, numbers_of, recalled_numbers
 from lie_codegen.signals.piecewise_waveform import piecewise_waveform
 from lie_codegen.signals.sampled_signal import Interpolated, Panels, resolve
 from lie_codegen.signals.trig_formula import NotTrigonometricError
-from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform, linear_image, with_values
+from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform
+from lie_codegen.values import Deferred, Later, settle
 
 __all__ = ["PeriodicInput"]
+
+#: (end, formulas) of each piece, as they were given.
+Pieces = tuple[tuple[Any, tuple[Any, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,55 +67,74 @@ class PeriodicInput(Saved):
         InputError: no component, an undeclared symbol.
     """
 
-    components: Sequence[Any]
-    period: Any = None
+    components: Sequence[Any] = Deferred()  # type: ignore[assignment]
+    period: Any = Deferred(None)
     parameters: Sequence[str] = ()
     breakpoints: Sequence[float] = ()
-    waveform: Waveform = field(default=None, repr=False, compare=False, metadata={"derived": True})  # type: ignore[assignment]
-    pieces: tuple[tuple[Any, ...], ...] = field(default=(), repr=False)
+    pieces: Pieces = field(default=(), repr=False)
     table: tuple[Array, ...] = field(default=(), repr=False)
+    function: Any = field(default=None, repr=False, compare=False, metadata={"derived": True})
 
     def __post_init__(self) -> None:
+        given = vars(self)["components"]
+        if given is None or isinstance(given, str) or _is_expression(given):
+            raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {given!r}")
         names = (self.parameters,) if isinstance(self.parameters, str) else tuple(self.parameters)
-        object.__setattr__(self, "parameters", names)
-        if isinstance(self.components, str | sp.Expr):
-            raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {self.components!r}")
-        object.__setattr__(self, "components", tuple(self.components))
-        if self.waveform is None:
-            object.__setattr__(self, "waveform", self._made(names))
-        object.__setattr__(self, "period", self.waveform.period)
-        inside = tuple(sorted(float(b) for b in self.breakpoints))
-        object.__setattr__(self, "breakpoints", inside)
+        settle(
+            self,
+            components=given if isinstance(given, _Seen) else tuple(given),
+            parameters=names,
+            breakpoints=tuple(sorted(float(b) for b in self.breakpoints)),
+            _given=vars(self)["period"],
+        )
+        if isinstance(given, _Seen):
+            settle(self, _numbers=given.numbers, _derive=given.waveform)
+            return
+        _ = self._numbers  # refuses what is no input
+        settle(self, period=Later(lambda: self.waveform.period))
 
-    def _made(self, names: tuple[str, ...]) -> Waveform:
-        """The waveform, from pieces, a table or formulas."""
+    @cached_property
+    def _numbers(self) -> InputNumbers:
+        """What it is in doubles; known from before where it is given by texts and numbers."""
+        formulas = not (self.pieces or self.table)
+        given = (self.components, self._given_period, self.parameters, self.breakpoints)
+        source = source_of("formulas", *given) if formulas else None
+
+        def made() -> InputNumbers:
+            return numbers_of(self.waveform, tuple(self.breakpoints))
+
+        return made() if source is None else recalled_numbers(source, made)
+
+    @cached_property
+    def waveform(self) -> Waveform:
+        """What averages are derived from: exact trigonometric polynomials, pieces of such, or values."""
+        if "_derive" in vars(self):
+            return cast(Waveform, vars(self)["_derive"]())
         if self.pieces:
-            symbols = tuple(symbol_of(name) for name in names)
-            return piecewise_waveform(
-                [end for end, _ in self.pieces], [list(row) for _, row in self.pieces], time_symbol(), symbols
-            )
+            symbols = {name: symbol_of(name) for name in self.parameters}
+            ends = [number_of(end, "the end of a piece", {}) for end, _ in self.pieces]
+            formulas = [[formula_of(entry, symbols) for entry in row] for _, row in self.pieces]
+            return piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
         if self.table:
             panels, values = Panels(self.table[0]), self.table[1]
-            return SampledWaveform(panels, values, Interpolated(panels, values), period_of(self.period, {}))
-        return formula_waveform(self.components, self.period, names, self.breakpoints)
+            function = self.function or Interpolated(panels, values)
+            return SampledWaveform(panels, values, function, period_of(self._given_period, {}))
+        return formula_waveform(self.components, self._given_period, self.parameters, self.breakpoints)
+
+    @property
+    def _given_period(self) -> Any:
+        return vars(self)["_given"]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        given = (self.components, self.period, self.parameters, self.breakpoints)
-        return PeriodicInput, (*given, None, self.pieces, self.table)
+        period = self.period if isinstance(self._given_period, Later) else self._given_period
+        given = (self.components, period, self.parameters, self.breakpoints)
+        return PeriodicInput, (*given, self.pieces, self.table)
 
     def as_formula(self, start: float, end: float) -> FormulaInput | None:
         """u on [start, end] as a compiled loop evaluates it; None where it is neither a Fourier series nor straight pieces."""
-        if self._series is not None:
-            return self._series
-        return None if self._pieces is None else lines_between(self._pieces, self.T, start, end)
-
-    @cached_property
-    def _series(self) -> FormulaInput | None:
-        return series_formula(self.waveform, self.dim)
-
-    @cached_property
-    def _pieces(self) -> PieceTable | None:
-        return piece_table(self.waveform, self.dim)
+        if self._numbers.series is not None:
+            return self._numbers.series
+        return None if self._numbers.lines is None else lines_between(self._numbers.lines, self.T, start, end)
 
     @staticmethod
     def from_fourier(
@@ -124,20 +151,12 @@ class PeriodicInput(Saved):
             ShapeError: if the three do not agree in n.
             NotFiniteError: NaN or infinity.
         """
-        c, s = coefficients_of(cosines, "cosines"), coefficients_of(sines, "sines")
-        m = coefficients_of([] if mean is None else [mean], "mean")
-        widths = {len(row) for table in (c, s, m) for row in table}
-        if len(widths) != 1:
-            raise ShapeError(
-                f"PeriodicInput.from_fourier: the coefficients have {sorted(widths)} components; give one n"
-            )
-        [n] = widths
-        omega = 2 * sp.pi / period_of(period, {})
-        zero = [sp.S.Zero] * n
-        terms = [list(m[0]) if m else zero]
-        terms += [[a * sp.cos((k + 1) * omega * time_symbol()) for a in row] for k, row in enumerate(c)]
-        terms += [[b * sp.sin((k + 1) * omega * time_symbol()) for b in row] for k, row in enumerate(s)]
-        return PeriodicInput(tuple(sp.Add(*(row[i] for row in terms)) for i in range(n)), period)
+
+        @cache
+        def exact() -> PeriodicInput:
+            return PeriodicInput(fourier_formulas(cosines, sines, mean, period), period)
+
+        return _seen(source_of("fourier", cosines, sines, mean, period), exact)
 
     @staticmethod
     def from_callable(
@@ -154,10 +173,13 @@ class PeriodicInput(Saved):
         probe = np.asarray(function(np.linspace(0, length, 3, endpoint=False)), dtype=float)
         if probe.ndim != 2 or probe.shape[0] != 3:
             raise ShapeError(f"PeriodicInput.from_callable: 3 times gave shape {probe.shape}; they must give (3, n)")
-        panels, values = resolve(lambda t: np.asarray(function(t), dtype=float), length, breakpoints)
-        waveform = SampledWaveform(panels, values, lambda t: np.asarray(function(t), dtype=float), exact)
+
+        def doubles(t: Array) -> Array:
+            return np.asarray(function(t), dtype=float)
+
+        panels, values = resolve(doubles, length, breakpoints)
         names = ("a function",) * probe.shape[1]
-        return PeriodicInput(names, exact, (), tuple(breakpoints), waveform, table=(panels.edges, values))
+        return PeriodicInput(names, exact, (), tuple(breakpoints), table=(panels.edges, values), function=doubles)
 
     @staticmethod
     def from_samples(values: ArrayLike, period: Any) -> PeriodicInput:
@@ -166,19 +188,8 @@ class PeriodicInput(Saved):
         Raises:
             ShapeError, NotFiniteError: naming `values`.
         """
-        samples = np.asarray(values, dtype=float)
-        if samples.ndim != 2 or len(samples) < 2:
-            raise ShapeError(f"PeriodicInput.from_samples: values has shape {samples.shape}; give (N, n) with N >= 2")
-        if not np.all(np.isfinite(samples)):
-            raise NotFiniteError("PeriodicInput.from_samples: values holds NaN or infinity")
-        spectrum = np.fft.rfft(samples, axis=0) / len(samples)
-        top = len(spectrum) - 1
-        weights = np.full(top, 2.0)
-        if len(samples) % 2 == 0:
-            weights[-1] = 1.0
-        cosines = weights[:, None] * spectrum[1:].real
-        sines = -weights[:, None] * spectrum[1:].imag
-        return PeriodicInput.from_fourier(cosines, sines, mean=spectrum[0].real, period=period)
+        mean, cosines, sines = series_through(values)
+        return PeriodicInput.from_fourier(cosines, sines, mean=mean, period=period)
 
     @staticmethod
     def from_pieces(pieces: Sequence[tuple[Any, Sequence[Any]]], *, parameters: Sequence[str] = ()) -> PeriodicInput:
@@ -191,28 +202,13 @@ class PeriodicInput(Saved):
             InputError: if the ends do not increase from 0, or a formula is not understood.
             ShapeError: if the pieces differ in the number of components.
         """
-        symbols = {name: symbol_of(name) for name in parameters}
-        ends = [number_of(end, "the end of a piece", {}) for end, _ in pieces]
-        moments = [float(end) for end in ends]
-        if not ends or any(b <= a for a, b in zip([0.0, *moments], moments, strict=False)):
-            raise InputError(f"PeriodicInput.from_pieces: the ends {moments} must increase from above 0")
-        formulas = [[formula_of(entry, symbols) for entry in entries] for _, entries in pieces]
-        if len({len(row) for row in formulas}) != 1:
-            raise ShapeError("PeriodicInput.from_pieces: every piece must have the same number of components")
-        inside = tuple(moments[:-1])
-        names = ("in pieces",) * len(formulas[0])
-        try:
-            waveform = piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
-            given = tuple((end, tuple(row)) for end, row in zip(ends, formulas, strict=True))
-            return PeriodicInput(names, ends[-1], tuple(symbols), inside, waveform, given)
-        except (NotTrigonometricError, PeriodError):
-            free = set().union(*(f.free_symbols for row in formulas for f in row)) - {time_symbol()}
-            if free:
-                raise InputError(
-                    f"PeriodicInput.from_pieces: the parameters {', '.join(sorted(map(str, free)))} need pieces that are "
-                    "polynomials in t with sines and cosines of commensurate rates"
-                ) from None
-        return PeriodicInput.from_callable(pieces_function(moments, formulas), ends[-1], breakpoints=inside)
+        given = tuple((end, tuple(entries)) for end, entries in pieces)
+
+        @cache
+        def exact() -> PeriodicInput:
+            return _in_pieces(given, parameters)
+
+        return _seen(source_of("pieces", given, parameters), exact, given)
 
     @property
     def _named(self) -> dict[str, sp.Symbol]:
@@ -221,17 +217,17 @@ class PeriodicInput(Saved):
     @property
     def dim(self) -> int:
         """n, the number of components."""
-        return self.waveform.dim
+        return self._numbers.dim
 
     @property
     def exact(self) -> bool:
         """Whether its averages are exact: sums of sines and cosines, or pieces of polynomials with them."""
-        return self.waveform.exact
+        return self._numbers.exact
 
     @cached_property
     def T(self) -> float:
         """The period as a double."""
-        return float(self.period)
+        return float(self.period) if self._numbers.T is None else self._numbers.T
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
@@ -247,18 +243,22 @@ class PeriodicInput(Saved):
     @property
     def mean(self) -> Array:
         """(n,) u_av in doubles."""
-        return np.array([float(value) for value in self.exact_mean])
+        known = self._numbers.mean
+        return np.array(known if known is not None else [float(value) for value in self.exact_mean])
 
-    @cached_property
+    @property
     def zero_mean(self) -> bool:
         """Whether u_av = 0 identically."""
-        calculus, u = self.waveform.calculus({}, self.dim)
-        return self.waveform.vanishes(calculus, calculus.mean(u))
+        return self._numbers.zero_mean
 
     @cached_property
     def jumps(self) -> tuple[float, ...]:
         """Times in [0, T) at which u is given to jump or bend: the breakpoints, and 0 if u(T-) differs from u(0)."""
-        start, end = self._evaluate(np.array([0.0, self.T * (1 - 1e-12)])) if not self.symbols else (0.0, 0.0)
+        start, end = (
+            self._evaluate(np.array([0.0, self.T * (1 - 1e-12)]))
+            if not (self.parameters and self.symbols)
+            else (0.0, 0.0)
+        )
         scale = max(1.0, float(np.max(np.abs(start), initial=0.0)))
         around = float(np.max(np.abs(np.asarray(end) - start), initial=0.0)) > 1e-6 * scale
         return (*((0.0,) if around else ()), *self.breakpoints)
@@ -308,7 +308,7 @@ class PeriodicInput(Saved):
             raise InputError("PeriodicInput.at: put the numbers into the formulas of an input in pieces")
         components = tuple(formula_of(each, self._named).subs(numbers) for each in self.components)
         period = period_of(self.period, self._named).subs(numbers)
-        return PeriodicInput(components, period, left, self.breakpoints, with_values(self.waveform, numbers))
+        return PeriodicInput(components, period, left, self.breakpoints)
 
     def linear(self, matrix: Any) -> PeriodicInput:
         """C u for a constant (m, n) matrix (exact entries, or floats at their exact binary value).
@@ -322,16 +322,15 @@ class PeriodicInput(Saved):
                 f"PeriodicInput.linear: the matrix has {exact.cols} columns, the input {self.dim} components"
             )
         if isinstance(self.waveform, TrigWaveform):
-            form = linear_image(self.waveform.form, exact)
-            moved = TrigWaveform(form, self.waveform.order)
             components = tuple(exact * sp.Matrix([formula_of(each, self._named) for each in self.components]))
-            return PeriodicInput(components, self.period, self.parameters, self.breakpoints, moved)
+            return PeriodicInput(components, self.period, self.parameters, self.breakpoints)
         numeric = np.array(exact.tolist(), dtype=float)
-        inner = self.waveform
-        return PeriodicInput.from_callable(lambda t: self(t) @ numeric.T, inner.period, breakpoints=self.breakpoints)
+        return PeriodicInput.from_callable(lambda t: self(t) @ numeric.T, self.period, breakpoints=self.breakpoints)
 
     @cached_property
     def _evaluate(self) -> Callable[[Array], Array]:
+        if self._numbers.values is not None:
+            return self._numbers.values
         waveform = self.waveform
         if isinstance(waveform, SampledWaveform):
             length, dim = waveform.panels.period, self.dim
@@ -347,3 +346,56 @@ class PeriodicInput(Saved):
         periodic = self.waveform.evaluator(calculus, wave, self.dim)
         drift, omega = self.mean, float(self.waveform.omega)
         return lambda t: periodic(t) / omega + t[..., None] * drift
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen(Later):
+    """The formulas of an input whose numbers are known from before."""
+
+    waveform: Callable[[], Waveform]
+    numbers: InputNumbers
+
+
+def _seen(source: Any, exact: Callable[[], PeriodicInput], pieces: Pieces = ()) -> PeriodicInput:
+    """The input that `exact` makes, once; where its source is plain data that was seen before, when its formulas are asked for."""
+    if source is None:
+        return exact()
+    numbers = recalled_numbers(source, lambda: exact()._numbers)
+    if numbers.values is None:
+        return exact()
+    return PeriodicInput(
+        _Seen(lambda: exact().components, lambda: exact().waveform, numbers),  # type: ignore[arg-type]
+        Later(lambda: exact().period),
+        breakpoints=numbers.breakpoints,
+        pieces=pieces,
+    )
+
+
+def _in_pieces(given: Pieces, parameters: Sequence[str]) -> PeriodicInput:
+    """The input of `from_pieces`, derived."""
+    symbols = {name: symbol_of(name) for name in parameters}
+    ends = [number_of(end, "the end of a piece", {}) for end, _ in given]
+    moments = [float(end) for end in ends]
+    if not ends or any(b <= a for a, b in zip([0.0, *moments], moments, strict=False)):
+        raise InputError(f"PeriodicInput.from_pieces: the ends {moments} must increase from above 0")
+    formulas = [[formula_of(entry, symbols) for entry in entries] for _, entries in given]
+    if len({len(row) for row in formulas}) != 1:
+        raise ShapeError("PeriodicInput.from_pieces: every piece must have the same number of components")
+    inside = tuple(moments[:-1])
+    names = ("in pieces",) * len(formulas[0])
+    try:
+        piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
+        return PeriodicInput(names, ends[-1], tuple(symbols), inside, given)
+    except (NotTrigonometricError, PeriodError):
+        free = set().union(*(f.free_symbols for row in formulas for f in row)) - {time_symbol()}
+        if free:
+            raise InputError(
+                f"PeriodicInput.from_pieces: the parameters {', '.join(sorted(map(str, free)))} need pieces that are "
+                "polynomials in t with sines and cosines of commensurate rates"
+            ) from None
+    return PeriodicInput.from_callable(pieces_function(moments, formulas), ends[-1], breakpoints=inside)
+
+
+def _is_expression(value: Any) -> bool:
+    """Whether it is one SymPy expression; without SymPy there is none."""
+    return "sympy" in sys.modules and isinstance(value, sp.Expr)

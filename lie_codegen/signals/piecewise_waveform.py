@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
-from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.piecewise_signal import Pieces, PiecewiseCalculus, ring_values
-from lie_codegen.signals.signal_values import expressions_of, table_of
+from lie_codegen.signals.signal_values import PiecewiseValues, expressions_of, table_of
 from lie_codegen.signals.trig_formula import Census, NotTrigonometricError, Reader, base_rate
 from lie_codegen.signals.trig_signal import Brackets, TrigCalculus, TrigSignal
 from lie_codegen.signals.waveform import moved
@@ -88,28 +87,15 @@ class PiecewiseWaveform:
         total = calculus.integral(signal)
         return expressions_of(total, dim, calculus.ring, sp.S.Zero, self.units).applyfunc(sp.expand)
 
-    def evaluator(self, calculus: PiecewiseCalculus, signal: Pieces, dim: int) -> Callable[[Array], Array]:
+    def evaluator(self, calculus: PiecewiseCalculus, signal: Pieces, dim: int) -> PiecewiseValues:
         """A signal as a function of t; at a joint, the piece that begins."""
         if self.parameters:
             names = ", ".join(map(str, self.parameters))
             raise InputError(f"the parameters {names} have no values")
         generators = tuple(float(g) for g in calculus.ring.generators)
         phases = tuple(float(unit) for unit in self.units)
-        tables = [table_of(piece, dim, calculus.ring, generators, phases) for piece in signal]
-        ends = np.array([float(end) for end in self.ends])
-        starts, omega, period = np.concatenate([[0.0], ends[:-1]]), float(self.omega), float(ends[-1])
-
-        def evaluate(t: Array) -> Array:
-            times = np.asarray(t, dtype=float)
-            inner = np.mod(times, period).ravel()
-            index = np.minimum(np.searchsorted(ends, inner, side="right"), len(ends) - 1)
-            result = np.empty((inner.size, dim))
-            for m, table in enumerate(tables):
-                here = index == m
-                result[here] = table(omega * (inner[here] - starts[m]))
-            return result.reshape(*times.shape, dim)
-
-        return evaluate
+        tables = tuple(table_of(piece, dim, calculus.ring, generators, phases) for piece in signal)
+        return PiecewiseValues(float(self.omega), np.array([float(end) for end in self.ends]), tables)
 
     def vanishes(self, calculus: PiecewiseCalculus, signal: Pieces) -> bool:
         """Whether a signal is identically zero."""

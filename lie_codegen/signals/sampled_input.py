@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput, lines_input
+from lie_codegen.values import settle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,9 +56,7 @@ class SampledInput(Saved):
         starts, ends = (v, v) if extra else (v[..., :-1, :], v[..., 1:, :])
         left = np.concatenate([first, starts, last], axis=-2)
         right = np.concatenate([first, ends, last], axis=-2)
-        object.__setattr__(self, "times", t)
-        object.__setattr__(self, "values", v)
-        object.__setattr__(self, "formula", lines_input(times, left, right))
+        settle(self, times=t, values=v, formula=lines_input(times, left, right))
 
     def as_formula(self, start: float, end: float) -> FormulaInput:
         """Itself: straight pieces at all times."""

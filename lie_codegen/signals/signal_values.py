@@ -40,6 +40,43 @@ class SignalTable:
         return total
 
 
+@dataclass(frozen=True)
+class SeriesValues:
+    """t -> a trigonometric polynomial in omega t, called with (...,) times: (..., n)."""
+
+    omega: float
+    table: SignalTable
+
+    def __call__(self, t: Array) -> Array:
+        return self.table(self.omega * np.asarray(t, dtype=float))
+
+
+@dataclass(frozen=True)
+class PiecewiseValues:
+    """t -> the piece in which t falls, each a table in omega (t - its start), repeated; at a joint, the piece that begins.
+
+    Attributes:
+        omega: the rate of the pieces' own time.
+        ends: (m,) of the pieces; the last is the period.
+        tables: (m).
+    """
+
+    omega: float
+    ends: Array
+    tables: tuple[SignalTable, ...]
+
+    def __call__(self, t: Array) -> Array:
+        times = np.asarray(t, dtype=float)
+        inner = np.mod(times, self.ends[-1]).ravel()
+        index = np.minimum(np.searchsorted(self.ends, inner, side="right"), len(self.ends) - 1)
+        starts = np.concatenate([[0.0], self.ends[:-1]])
+        result = np.empty((inner.size, self.tables[0].cosines.shape[1]))
+        for m, table in enumerate(self.tables):
+            here = index == m
+            result[here] = table(self.omega * (inner[here] - starts[m]))
+        return result.reshape(*times.shape, result.shape[1])
+
+
 def table_of(
     signal: TrigSignal, dim: int, ring: CoefficientRing, generators: Sequence[Any] = (), phases: Sequence[float] = ()
 ) -> SignalTable:

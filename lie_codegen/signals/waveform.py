@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -15,10 +14,9 @@ from lie_codegen.errors import InputError
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.sampled_signal import Panels, SampledCalculus
-from lie_codegen.signals.signal_values import expressions_of, integral_of, table_of
+from lie_codegen.signals.signal_values import SeriesValues, expressions_of, integral_of, table_of
 from lie_codegen.signals.trig_formula import TrigForm
 from lie_codegen.signals.trig_signal import Brackets, TrigCalculus, TrigSignal
-from lie_codegen.signals.trigonometric import add_scaled, clean
 
 Signal = Any
 Calculus = Any
@@ -118,15 +116,14 @@ class TrigWaveform:
     def integral(self, calculus: TrigCalculus, signal: TrigSignal, dim: int) -> sp.ImmutableMatrix:
         return integral_of(calculus.primitive(signal), dim, calculus.ring, self.form.units)
 
-    def evaluator(self, calculus: TrigCalculus, signal: TrigSignal, dim: int) -> Callable[[Array], Array]:
+    def evaluator(self, calculus: TrigCalculus, signal: TrigSignal, dim: int) -> SeriesValues:
         if self.parameters:
             names = ", ".join(map(str, self.parameters))
             raise InputError(f"the parameters {names} have no values; give them with .at({names}=...)")
         generators = tuple(float(g) for g in calculus.ring.generators)
         phases = tuple(float(unit) for unit in self.form.units)
         table = table_of(signal, dim, calculus.ring, generators, phases)
-        omega = float(self.omega)
-        return lambda t: table(omega * np.asarray(t, dtype=float))
+        return SeriesValues(float(self.omega), table)
 
     def vanishes(self, calculus: TrigCalculus, signal: TrigSignal) -> bool:
         return signal.is_zero
@@ -212,63 +209,3 @@ class SampledWaveform:
 
     def vanishes(self, calculus: SampledCalculus, signal: Array) -> bool:
         return float(np.max(np.abs(signal), initial=0.0)) <= 1e-11 * max(1.0, float(np.max(np.abs(self.values))))
-
-
-def with_values(waveform: TrigWaveform, values: Mapping[sp.Symbol, sp.Expr]) -> TrigWaveform:
-    """The functions with numbers in place of parameters; phases stay phases, at their values."""
-    form = waveform.form
-
-    def replaced(numerator: Any) -> sp.Expr:
-        return sp.expand(form.ring.expression(numerator).subs(values))
-
-    exact = {
-        i: {p: {key: [replaced(a), replaced(b)] for key, (a, b) in wave.items()} for p, wave in component.items()}
-        for i, component in form.signal.components.items()
-    }
-    ring = CoefficientRing.holding(v for c in exact.values() for w in c.values() for pair in w.values() for v in pair)
-    signal = _collected(exact, ring, form.signal.denominator)
-    units = tuple(unit.subs(values) for unit in form.units)
-    return replace(waveform, form=replace(form, signal=signal, ring=ring, units=units, omega=form.omega.subs(values)))
-
-
-def _collected(exact: Mapping[int, Any], ring: CoefficientRing, denominator: int) -> TrigSignal:
-    """A TrigSignal from SymPy coefficients."""
-    common = 1
-    for component in exact.values():
-        for wave in component.values():
-            for pair in wave.values():
-                common = math.lcm(common, *(ring.element(value)[1] for value in pair))
-
-    def scaled(value: sp.Expr) -> Any:
-        numerator, d = ring.element(value)
-        return numerator * (common // d)
-
-    components = {}
-    for i, component in exact.items():
-        waves = {
-            p: clean({key: [scaled(a), scaled(b)] for key, (a, b) in wave.items()}) for p, wave in component.items()
-        }
-        if waves := {p: wave for p, wave in waves.items() if wave}:
-            components[i] = waves
-    return TrigSignal(components, denominator * common)
-
-
-def linear_image(form: TrigForm, matrix: sp.MatrixBase) -> TrigForm:
-    """The form of C u: an exact matrix times the functions."""
-    entries = [sp.expand(value) for value in matrix.flat()]
-    ring = CoefficientRing.holding([*form.ring.generators, *entries])
-    signal = moved(form.signal, form.ring, ring)
-    elements = [ring.element(value) for value in entries]
-    common = int(sp.ilcm(1, *(d for _, d in elements)))
-    components: dict[int, Any] = {}
-    for r in range(matrix.rows):
-        target: dict[int, list[Any]] = {}
-        for c, component in signal.components.items():
-            numerator, d = elements[r * matrix.cols + c]
-            if numerator:
-                add_scaled(target, component[0], numerator * (common // d), ring.multiply)
-        kept = {key: entry for key, entry in target.items() if entry[0] or entry[1]}
-        if kept:
-            components[r] = {0: kept}
-    scaled = TrigSignal(components, signal.denominator * common)
-    return replace(form, signal=scaled, ring=ring, dim=matrix.rows)

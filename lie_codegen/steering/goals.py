@@ -18,6 +18,7 @@ from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError, Stee
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.values import settle
 
 Numbers = tuple[Any, ...]
 
@@ -40,8 +41,11 @@ class Pointing(Saved):
     direction: ArrayLike
 
     def __post_init__(self) -> None:
-        for name in ("axis", "direction"):
-            object.__setattr__(self, name, _plain(getattr(self, name), f"Pointing: {name}"))
+        settle(
+            self,
+            axis=_plain(self.axis, "Pointing: axis"),
+            direction=_plain(self.direction, "Pointing: direction"),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +59,7 @@ class Position(Saved):
     point: ArrayLike
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", _plain(self.point, "Position: point"))
+        settle(self, point=_plain(self.point, "Position: point"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,11 +77,9 @@ class Coset(Saved):
     side: str = "right"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "element", _plain(self.element, "Coset: element"))
         given = (self.free,) if isinstance(self.free, str) else self.free
-        object.__setattr__(
-            self, "free", tuple(each if isinstance(each, str) else _plain(each, "Coset: free") for each in given)
-        )
+        free = tuple(each if isinstance(each, str) else _plain(each, "Coset: free") for each in given)
+        settle(self, element=_plain(self.element, "Coset: element"), free=free)
         if self.side not in ("left", "right"):
             raise SteeringInputError(f'Coset: side is "right" (X in T H) or "left" (X in H T), got {self.side!r}')
 
@@ -93,7 +95,7 @@ class UpToPhase(Saved):
     gate: ArrayLike
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gate", _plain(self.gate, "UpToPhase: gate"))
+        settle(self, gate=_plain(self.gate, "UpToPhase: gate"))
 
 
 GoalSet = Pointing | Position | Coset | UpToPhase

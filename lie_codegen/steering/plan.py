@@ -19,7 +19,7 @@ from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved, json_value, table_text
-from lie_codegen.values import Value
+from lie_codegen.values import Value, settle
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
 PACKAGE = "lie_codegen.steering.plan_package"
@@ -69,7 +69,7 @@ class Controls(Value):
     duration: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "breakpoints", np.asarray(self.breakpoints, dtype=float))
+        settle(self, breakpoints=np.asarray(self.breakpoints, dtype=float))
 
     def __call__(self, t: ArrayLike) -> Array:
         """u at t: (n,) for a number, (k, n) for (k,) times.
@@ -215,7 +215,7 @@ class Plan(Saved):
 
     def __post_init__(self) -> None:
         if self.u.duration != self.duration:
-            object.__setattr__(self, "u", self.u.over(self.duration))
+            settle(self, u=self.u.over(self.duration))
 
     @cached_property
     def facts(self) -> Facts:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -18,8 +17,7 @@ from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.identifiers import shown
-from lie_codegen.kernel.saved import record_of, value_of
-from lie_codegen.runtime.records import find_record, store_record
+from lie_codegen.runtime.records import recalled
 from lie_codegen.steering.accessibility import with_drift
 
 #: Durations in seconds that double precision carries.
@@ -115,13 +113,7 @@ def make_task(
 def reach(group: MatrixGroup, controls: tuple[int, ...]) -> Controllability:
     """The report, exact: made, or from its record in the cache."""
     source = [group.definition.text, controls]
-    with contextlib.suppress(InputError):
-        found = value_of(find_record("controllability", source))
-        if isinstance(found, Controllability):
-            return found
-    report = controllability(group.algebra, controls)
-    store_record("controllability", source, record_of(report))
-    return report
+    return recalled("controllability", source, Controllability, lambda: controllability(group.algebra, controls))
 
 
 def _require_drift_helps(group: MatrixGroup, report: Controllability, drift: Any) -> None:

@@ -17,6 +17,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.values import settle
 
 
 class Distribution(Saved, ABC):
@@ -47,12 +48,6 @@ def _numbers(where: str, value: ArrayLike) -> Array:
     if not np.all(np.isfinite(array)):
         raise InputError(f"{where} must be finite, given {value!r:.60}")
     return array
-
-
-def _keep(record: Any, **values: Any) -> None:
-    """Fields as they were read: the record is frozen, and this is its own __post_init__."""
-    for name, value in values.items():
-        object.__setattr__(record, name, value)
 
 
 def _quantile(uniform: Array) -> Array:
@@ -91,7 +86,7 @@ class Normal(Distribution):
                 mean, std = (np.array(each) for each in np.broadcast_arrays(mean, std))
             except ValueError:
                 raise ShapeError(f"Normal: mean has shape {mean.shape} and std {std.shape}") from None
-        _keep(self, mean=mean, std=std, cov=cov)
+        settle(self, mean=mean, std=std, cov=cov)
 
     @property
     def slots(self) -> int:
@@ -124,7 +119,7 @@ class Uniform(Distribution):
 
     def __post_init__(self) -> None:
         low, high = _range(type(self).__name__, self.low, self.high)
-        _keep(self, low=low, high=high)
+        settle(self, low=low, high=high)
 
     @property
     def slots(self) -> int:
@@ -188,7 +183,7 @@ class Choice(Distribution):
         p = None if self.p is None else _numbers("Choice: p", self.p)
         if p is not None and (p.shape != (len(values),) or np.any(p < 0) or abs(np.sum(p) - 1) > 1e-9):
             raise InputError(f"Choice: p is {len(values)} probabilities that add to one")
-        _keep(self, values=values, p=p)
+        settle(self, values=values, p=p)
 
     @property
     def slots(self) -> int:
@@ -212,7 +207,7 @@ class Grid(Distribution):
     values: Any
 
     def __post_init__(self) -> None:
-        _keep(self, values=_listed("Grid", self.values))
+        settle(self, values=_listed("Grid", self.values))
 
     def __len__(self) -> int:
         return len(self.values)
@@ -241,7 +236,7 @@ class Designed(Distribution):
             if self.high is not None or self.of.slots == 0 or isinstance(self.of, Designed):
                 raise InputError(f"{name}: give a random distribution alone, or low and high")
             return
-        _keep(self, of=Uniform(self.of, 1.0 if self.high is None else self.high), high=None)
+        settle(self, of=Uniform(self.of, 1.0 if self.high is None else self.high), high=None)
 
     @property
     def slots(self) -> int:
@@ -295,7 +290,7 @@ class OnGroup(Distribution):
                 )
         else:
             spread = _spread(group, self.spread)
-        _keep(self, group=group, mean=mean, spread=spread)
+        settle(self, group=group, mean=mean, spread=spread)
 
     @property
     def slots(self) -> int:

@@ -26,6 +26,7 @@ from lie_codegen.studies.batched import batched_call, replayed_call
 from lie_codegen.studies.draws import noise_seed
 from lie_codegen.studies.results import Of, Single
 from lie_codegen.studies.summaries import summary
+from lie_codegen.values import settle
 
 #: One value a sample, by name.
 Columns = Mapping[str, Array]
@@ -71,13 +72,7 @@ class Run:
             )
         if reduce is not None and not callable(reduce):
             raise InputError("study: reduce is a function of a result that gives a dict of arrays")
-        for name, value in (
-            ("function", function),
-            ("arguments", arguments),
-            ("options", dict(options)),
-            ("reduce", reduce),
-        ):
-            object.__setattr__(self, name, value)
+        settle(self, function=function, arguments=arguments, options=dict(options), reduce=reduce)
 
     def __repr__(self) -> str:
         given = [f"{each!r:.30}" for each in self.arguments] + [

@@ -17,6 +17,10 @@ START = (
     "import sys, numpy as np, lie_codegen as lc; TARGET = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]; T = np.linspace(0, 1, 5)"
 )
 LAW = "lc.attitude_law('pd', inertia=(1, 2, 3), k_p=4, k_d=3)"
+POTENTIAL = (
+    "lc.tracking_law('so3', inertia=(1, 2, 3), gains={'K_d': 6}, "
+    "error=lc.error_function('so3', 'tr(K*(1 - Xd^-1*X))/2', parameters={'K': np.diag([1, 2, 3]).tolist()}))"
+)
 HEAVY = ("casadi", "jinja2", "scipy", "sympy")
 #: What a user asks for first -> what it may still import of HEAVY.
 PATHS = {
@@ -33,11 +37,18 @@ PATHS = {
     "lc.build(lc.quadrotor_law(mass=1, inertia=(1, 2, 3), gains={'k_x': 4, 'k_v': 3, 'k_R': 8, 'k_W': 2}))": (),
     f"lc.closed_loop('so3', law={LAW}, inertia=(1, 2, 3), X0=TARGET, t=T, step=0.01)": (),
     "lc.steer('so3', TARGET, controls=[0, 1], duration=1.0)": (),
-    "lc.simulate('so3', ['sin(t)', 'cos(t)', '1'], t=T)": ("sympy",),
+    "lc.simulate('so3', ['sin(t)', 'cos(t)', '1'], t=T)": (),
+    "lc.simulate('so3', ['t', 'exp(-t)', '1'], t=T)": (),
+    "lc.simulate('so3', ['-X[0][1]', 'cos(t)', '1'], t=T)": (),
     "lc.simulate('so3', np.ones((5, 3)), t=T)": (),
     "lc.simulate('su4', np.ones((5, 15)), t=T)": (),
-    "lc.reference('so3', ['sin(t)', '0', '1'])": ("sympy",),
-    "lc.PeriodicInput(['sin(t)', '1'])": ("sympy",),
+    "lc.simulate('so3', lc.PeriodicInput.from_fourier([[1, 0, 0.1]], [[0, 1, 0]]), t=T)": (),
+    "lc.simulate('so3', lc.PeriodicInput.from_samples(np.eye(5)[:, :3], 2), t=T)": (),
+    "lc.simulate('so3', lc.PeriodicInput.from_pieces([('1', ['t', '1', '0']), (2, ['2-t', '0', '0'])]), t=T)": (),
+    "lc.PeriodicInput(['exp(sin(t))', 'cos(t)'], '2*pi')(T)": (),
+    "lc.reference('so3', ['sin(t)', '0', '1'])": (),
+    f"lc.build({POTENTIAL})": (),
+    f"lc.closed_loop(law={POTENTIAL}, inertia=(1, 2, 3), reference=['sin(t)', '0', 't/2'], X0=TARGET, t=T)": (),
 }
 
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -234,3 +239,36 @@ def test_the_coefficient_ring_reduces_square_roots() -> None:
     assert sp.expand(ring.expression(ring.multiply(a, b), d * e) - sp.sqrt(3) * sp.pi) == 0
     with pytest.raises(InputError):
         ring.element(sp.sqrt(5))
+
+
+def test_a_replaced_formula_is_the_one_that_is_evaluated() -> None:
+    u = PeriodicInput(["sin(t)", "1"])
+    moved = replace(u, components=("cos(t)", "2"))
+    np.testing.assert_array_equal(moved(0.3), [np.cos(0.3), 2.0])
+    slower = replace(PeriodicInput.from_fourier([[1.0, 0.0]]), period="4*pi")
+    np.testing.assert_array_equal(slower(0.3), [np.cos(0.3), 0.0])
+    assert 4 * np.pi == slower.T
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: PeriodicInput(["sin(t) + 1/3", "cos(2*t + 1)"]),
+        lambda: PeriodicInput(["exp(sin(t))", "cos(t)"], "2*pi"),
+        lambda: PeriodicInput.from_fourier([[0.1, 2]], [[0, 3]], mean=["1/3", 0], period="sqrt(2)"),
+        lambda: PeriodicInput.from_pieces([("1/2", ["t", "sin(t)"]), ("2", ["1 - t^2", "0"])]),
+    ],
+)
+def test_an_input_found_by_its_record_is_the_one_that_was_derived(
+    make: Callable[[], PeriodicInput], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIE_CODEGEN_CACHE", str(tmp_path))
+    derived, found = make(), make()
+    t = np.linspace(-3, 7, 101)
+    np.testing.assert_array_equal(found(t), derived(t))
+    np.testing.assert_array_equal(found.mean, derived.mean)
+    assert (found.T, found.dim, found.exact, found.zero_mean, found.jumps) == (
+        derived.T, derived.dim, derived.exact, derived.zero_mean, derived.jumps,
+    )  # fmt: skip
+    assert found == derived == pickle.loads(pickle.dumps(found))
+    np.testing.assert_allclose(found.integral(t), derived.integral(t), rtol=0, atol=1e-15)

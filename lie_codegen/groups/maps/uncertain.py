@@ -18,6 +18,7 @@ from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.covariance import compounded, flowed, transported
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.values import settle
 
 _MOST_STEPS = 50
 _SETTLED = 1e-13
@@ -48,14 +49,13 @@ class Uncertain(Saved):
         shift = np.zeros(group.dim) if self.mean_shift is None else np.asarray(self.mean_shift, dtype=float)
         if shift.shape != (group.dim,) or not np.all(np.isfinite(shift)):
             raise ShapeError(f"Uncertain: mean_shift is ({group.dim},) finite numbers, given {shift.shape}")
-        plain = {
-            "group": group,
-            "X": admitted(group, self.X, "Uncertain: X").X,
-            "covariance": _covariance(self.covariance, group.dim, "Uncertain: covariance"),
-            "mean_shift": shift,
-        }
-        for name, value in plain.items():
-            object.__setattr__(self, name, value)
+        settle(
+            self,
+            group=group,
+            X=admitted(group, self.X, "Uncertain: X").X,
+            covariance=_covariance(self.covariance, group.dim, "Uncertain: covariance"),
+            mean_shift=shift,
+        )
         _warn_wide(self)
 
     def compound(self, other: Uncertain, order: Literal[2, 4] = 4) -> Uncertain:
