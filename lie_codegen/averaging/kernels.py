@@ -28,6 +28,7 @@ from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
 from lie_codegen.kernel.linear import Vector, matmul, plus, scaled
+from lie_codegen.kernel.renaming import in_namespace
 from lie_codegen.on_demand import sympy as sp
 
 _SOURCE = {
@@ -39,13 +40,13 @@ _EPS = Port("eps", (), "1", description="amplitude that scales u")
 _T = Port("t", (), "s", description="time")
 
 
-@kernel_factory()
-def averaged_kernels(averaged: Averaged, statement: str = "") -> tuple[Kernel, ...]:
+def averaged_kernels(averaged: Averaged, statement: str = "", *, name: str | None = None) -> tuple[Kernel, ...]:
     """averaged_rate, averaged_state and periodic_input of an average; parameters become scalar inputs by their names.
 
     Args:
         averaged: the average; its X0 must be the identity (by left invariance, multiply from the left).
         statement: the measured order and constant, `order_check(...).statement`; the generated header states it.
+        name: C identifier that begins every symbol; the group's name if None.
 
     Raises:
         InputError: a sampled input (its Lambda has no formula; see `averaged_rate`), or an X0 that is not I.
@@ -56,7 +57,8 @@ def averaged_kernels(averaged: Averaged, statement: str = "") -> tuple[Kernel, .
         )
     if not np.array_equal(averaged.X0, np.eye(averaged.group.degree)):
         raise InputError("averaged_kernels: X0 must be the identity; multiply the state from the left by your X0")
-    return averaged_rate(averaged, statement), averaged_state(averaged, statement), periodic_input(averaged)
+    kernels = (averaged_rate(averaged, statement), averaged_state(averaged, statement), periodic_input(averaged))
+    return in_namespace(kernels, name)
 
 
 @kernel_factory()

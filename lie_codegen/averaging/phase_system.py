@@ -99,10 +99,14 @@ class PhaseAverage(Saved):
     numbers: Mapping[str, Any] = field(default_factory=dict)
     nodes: int = 32
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """terms, near_identity, mean_rate and actual_rate, for lc.build and lc.generate."""
+    def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """terms, near_identity, mean_rate and actual_rate, for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol.
+        """
         return formula_phase_kernels(
-            self.F, self.G, self.rate, self.variables, self.phase, self.period, dict(self.numbers), self.nodes
+            self.F, self.G, self.rate, self.variables, self.phase, self.period, dict(self.numbers), self.nodes, name
         )
 
     @property

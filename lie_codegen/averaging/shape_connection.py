@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.averaging.frame_search import best_frame
 from lie_codegen.averaging.shape_average import GaitAverage, gait_average
 from lie_codegen.averaging.shape_form import ShapeForm
-from lie_codegen.averaging.shape_kernels import connection_kernels
+from lie_codegen.averaging.shape_kernels import NAMESPACE, connection_kernels
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.identifiers import check_identifier
@@ -59,9 +59,14 @@ class ShapeConnection(ShapeForm):
         """
         return best_frame(self, half_width, degree, length, centre)
 
-    def kernels(self, harmonics: int = 3) -> tuple[Kernel, ...]:
-        """connection, r -> A(r), and gait_step, for lc.build and lc.generate."""
-        return connection_kernels(self, harmonics)
+    def kernels(self, harmonics: int = 3, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """connection, r -> A(r), shape_velocity and gait_step, for lc.build and lc.generate.
+
+        Args:
+            harmonics: of the gait's Fourier series.
+            name: C identifier that begins every symbol.
+        """
+        return connection_kernels(self, harmonics, name)
 
 
 def connection(group: GroupLike, *, shape: Sequence[str], A: Any = None, metric: Any = None) -> ShapeConnection:

@@ -25,7 +25,7 @@ SOURCE = "TR 93-59, section 6; Hatton and Choset, IEEE T-RO 29 (2013)"
 
 
 @kernel_factory()
-def connection_kernels(connection: ShapeForm, harmonics: int = 3) -> tuple[Kernel, ...]:
+def connection_kernels(connection: ShapeForm, harmonics: int = 3, namespace: str = NAMESPACE) -> tuple[Kernel, ...]:
     """connection: r -> A(r); shape_velocity: (r, v) -> xi = -A(r) v, for lc.ocp; gait_step: (X, gait, t, h) -> X_next, one Magnus step of order 4 along a Fourier series of period 2 pi.
 
     Raises:
@@ -80,10 +80,10 @@ def connection_kernels(connection: ShapeForm, harmonics: int = 3) -> tuple[Kerne
     r = Port("r", (k,), description=", ".join(connection.shape))
     gait = Port("gait", (k, 2 * harmonics + 1), description="mean, cosines, sines of each shape")
     return (
-        Kernel("connection", NAMESPACE, (r,), (Port("A", (n, k)),),
+        Kernel("connection", namespace, (r,), (Port("A", (n, k)),),
                lambda ops, r: (at(ops, r),), "xi = -A(r) r'", SOURCE),
-        Kernel("shape_velocity", NAMESPACE, (r, Port("v", (k,), description="shape velocities")), (Port("xi", (n,)),),
+        Kernel("shape_velocity", namespace, (r, Port("v", (k,), description="shape velocities")), (Port("xi", (n,)),),
                lambda ops, r, v: ([product(-1, dot(row, v)) for row in at(ops, r)],), "xi = -A(r) v", SOURCE),
-        Kernel("gait_step", NAMESPACE, (matrix_port(group, "X"), gait, Port("t", ()), Port("h", ())), (matrix_port(group, "X_next"),),
+        Kernel("gait_step", namespace, (matrix_port(group, "X"), gait, Port("t", ()), Port("h", ())), (matrix_port(group, "X_next"),),
                step, "X' = X hat(-A(r) r'), one Magnus step of order 4", SOURCE, sampler),
     )  # fmt: skip

@@ -67,9 +67,15 @@ class TimeAverage(Saved):
     nodes: int = 32
     exact: bool = False
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """terms, near_identity (order > 1), mean_rate and actual_rate, for lc.build and lc.generate."""
-        return formula_time_kernels(self.rates, self.variables, self.period, self.order, dict(self.numbers), self.nodes)
+    def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """terms, near_identity (order > 1), mean_rate and actual_rate, for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol.
+        """
+        return formula_time_kernels(
+            self.rates, self.variables, self.period, self.order, dict(self.numbers), self.nodes, name
+        )
 
     @property
     def library(self) -> Library:

@@ -19,6 +19,7 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.element_pattern import packed_size, varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.renaming import in_namespace
 from lie_codegen.mechanics.states import initial_states
 
 _SHOWN = 50
@@ -69,6 +70,7 @@ def generate_closed_loop(
     xi0: ArrayLike | None = None,
     duration: float = 20.0,
     step: float = 0.01,
+    name: str | None = None,
 ) -> Path:
     """The C package of the law (and its reference and body), with closed_loop.c; returns the folder.
 
@@ -78,8 +80,11 @@ def generate_closed_loop(
         inertia, law, reference, X0, xi0: as `closed_loop`.
         duration: [s] that closed_loop.c simulates.
         step: [s] from one call of the law to the next; its force, and the rates of states of its own, are held between.
+        name: C identifier of the header, the source and the target, which begins the symbols of the body and of the reference; the
+            group's if None. So two such packages, with laws of names of their own, go into one program.
 
     Raises:
+        IdentifierError: the name is no C identifier.
         InputError: as `closed_loop`; a duration or step that is not positive.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
@@ -91,18 +96,26 @@ def generate_closed_loop(
     for value, what in ((duration, "duration"), (step, "step")):
         positive_number(value, what)
     check_loop(law, reference)
-    kernels = [law, held_force_step(group, inertia)]
-    kernels += [] if reference is None else [reference_kernel(reference)]
+    own = [held_force_step(group, inertia)]
+    own += [] if reference is None else [reference_kernel(reference)]
+    kernels = [law, *in_namespace(own, name)]
     start, many = initial_states(group, X0, xi0)
     if many:
         raise InputError("closed_loop.c runs from one initial state: give one X0 and one xi0")
-    view = _view(group, law, reference, start[0], duration, step)
+    namespace = group.name if name is None else name
+    view = _view(group, law, reference, start[0], duration, step, namespace)
     extra = {"closed_loop.c": render("closed_loop.c.jinja", loop=view)}
-    return write_package(render_package(group.name, kernels, extra=extra), folder)
+    return write_package(render_package(namespace, kernels, extra=extra), folder)
 
 
 def _view(
-    group: MatrixGroup, law: Kernel, reference: Reference | None, state: Any, duration: float, step: float
+    group: MatrixGroup,
+    law: Kernel,
+    reference: Reference | None,
+    state: Any,
+    duration: float,
+    step: float,
+    namespace: str,
 ) -> LoopView:
     read = read_law(law)
     parts = 2 if group.is_complex else 1
@@ -113,8 +126,8 @@ def _view(
     energy = next((name for name in ("W", "V", "phi") if name in names), "")
     steps = round(duration / step)
     return LoopView(
-        namespace=group.name,
-        law=law.name,
+        namespace=namespace,
+        law=law.symbol,
         reference="" if reference is None else "reference",
         plant="held_force_step",
         energy=energy,

@@ -35,6 +35,7 @@ from lie_codegen.kernel.brackets import ad, bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port, Sampler
 from lie_codegen.kernel.linear import identity, matmul
+from lie_codegen.kernel.renaming import in_namespace
 
 _WEI_NORMAN = "Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and Krishnaprasad, TR 93-59, (12)-(15)"
 _JACOBIANS = (
@@ -49,10 +50,18 @@ _NEWTON_SCHULZ = "Higham, Functions of Matrices (2008), (8.20); any form in plac
 _PRODUCT = "the group's own product"
 
 
-def group_kernels(group: GroupLike) -> tuple[Kernel, ...]:
-    """All kernels of a group, in the order of `KERNEL_NAMES`."""
+def group_kernels(group: GroupLike, *, name: str | None = None) -> tuple[Kernel, ...]:
+    """All kernels of a group, in the order of `KERNEL_NAMES`.
+
+    Args:
+        group: object, catalogue name or file.
+        name: C identifier that begins every symbol; the group's name if None.
+
+    Raises:
+        IdentifierError: the name is no C identifier.
+    """
     group = as_group(group, "group_kernels")
-    return tuple(group_kernel(group, name) for name in KERNEL_NAMES)
+    return in_namespace([group_kernel(group, each) for each in KERNEL_NAMES], name)
 
 
 @kernel_factory()

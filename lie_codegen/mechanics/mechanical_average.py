@@ -16,6 +16,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.kernel.renaming import in_namespace
 from lie_codegen.kernel.runge_kutta import CLASSICAL, TUPLES, increment
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.effective_potential import EffectivePotential, effective_potential
@@ -199,14 +200,19 @@ class MechanicalAverage(Saved):
         """Why there is no effective potential."""
         return self._potential.reason
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """rate, actual, estimate, reconstruct, for lc.build and lc.generate."""
-        return (
+    def kernels(self, name: str | None = None) -> tuple[Kernel, ...]:
+        """rate, actual, estimate, reconstruct, for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol; vibration if None.
+        """
+        kernels = (
             rate_kernel(self.fields),
             actual_kernel(self.fields),
             reconstruct_kernel(self.fields, back=True),
             reconstruct_kernel(self.fields, back=False),
         )
+        return in_namespace(kernels, name)
 
     def loop(self, eps: float) -> Kernel:
         """The actual system as (y, t) -> y', y = (xi, advected vectors), of period `period(eps)`: for lc.floquet."""

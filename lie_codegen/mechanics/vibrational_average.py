@@ -78,11 +78,15 @@ class VibrationalAverage(Saved):
             raise InputError(f"the terms of this average are those of order 1 to {self.fields.order}, got {q!r}")
         return broadcast_call(self.library[f"term_{q}"], z, *self._values(parameters))[0]
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """rate, actual, estimate, estimate_first, reconstruct and term_1 .., for lc.build and lc.generate."""
+    def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """rate, actual, estimate, estimate_first, reconstruct and term_1 .., for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol.
+        """
         if isinstance(self.fields, LagrangianSeries):
-            return series_kernels(self.fields, NAMESPACE)
-        return (*vibrational_kernels(self.fields, NAMESPACE), *term_kernels(self.fields, NAMESPACE))
+            return series_kernels(self.fields, name)
+        return (*vibrational_kernels(self.fields, name), *term_kernels(self.fields, name))
 
     @cached_property
     def library(self) -> Library:

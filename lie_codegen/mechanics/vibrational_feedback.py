@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.parameter import refuse_input
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.lagrangian_average import LagrangianSeries
 from lie_codegen.mechanics.relative_equilibria import newton, parameter_numbers
@@ -94,10 +95,11 @@ def design_feedback(
         limit: saturation of |alpha|.
 
     Raises:
-        InputError: an unknown amplitude; brackets that vanish at the equilibrium (no authority); an unstable mode no
+        InputError: eps "input", for the gains are those of one eps; an unknown amplitude; brackets that vanish at the equilibrium (no authority); an unstable mode no
             amplitude reaches (the direction is named); a primitive without a zero common to all inputs.
         ComputationError: no averaged equilibrium near the guess.
     """
+    refuse_input(eps, "design_feedback: eps", "the gains and the averaged equilibrium are those of this ratio")
     if isinstance(fields, LagrangianSeries):
         fields = fields.exact()
     names = [str(p) for p in fields.parameters]

@@ -70,22 +70,24 @@ class EulerAverage(Saved):
     perturbation: EulerPerturbation
     tolerance: float = 1e-12
 
-    def kernels(self, *, largest_k: float = 0.9) -> tuple[Kernel, ...]:
+    def kernels(self, *, largest_k: float = 0.9, name: str = NAMESPACE) -> tuple[Kernel, ...]:
         """variational, rate and averaged, and terms, near_identity, mean_rate and actual_rate of the second order.
 
         Args:
             largest_k: where g is not affine, the averages in C take as many fixed phases as rounding accuracy needs up
                 to this modulus, by the nome.
+            name: C identifier that begins every symbol.
         """
-        return (*self._basic(), self.averaged_kernel(largest_k), *second_order_kernels(self.perturbation, NAMESPACE))
+        basic, averages = self._basic(name), self.averaged_kernel(largest_k, name)
+        return (*basic, averages, *second_order_kernels(self.perturbation, name))
 
-    def averaged_kernel(self, largest_k: float = 0.9) -> Kernel:
+    def averaged_kernel(self, largest_k: float = 0.9, name: str = NAMESPACE) -> Kernel:
         """(Omega, k) -> averages: Table 3 for affine g, else the trapezoid rule with `nodes_for(largest_k)` phases."""
-        return euler_kernels.averaged(self.perturbation, NAMESPACE, nodes_for(largest_k))
+        return euler_kernels.averaged(self.perturbation, name, nodes_for(largest_k))
 
-    def _basic(self) -> tuple[Kernel, ...]:
+    def _basic(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
         make, g = euler_kernels, self.perturbation
-        return make.variational(g, NAMESPACE), make.rate(g, NAMESPACE)
+        return make.variational(g, name), make.rate(g, name)
 
     @cached_property
     def library(self) -> Library:

@@ -62,9 +62,13 @@ class FreeRigidBody(Saved):
         """(3, 3) R with the principal axes as columns, right-handed: inertia = R diag(moments) R^T, omega = R omega_principal."""
         return np.eye(3) if self.columns is None else np.array(self.columns)
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """to_slow, from_slow, frequency and constants_of_motion, for lc.build and lc.generate."""
-        return _kernels(self.model)
+    def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """to_slow, from_slow, frequency and constants_of_motion, for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol.
+        """
+        return _kernels(self.model, name)
 
     @property
     def library(self) -> Library:
@@ -226,13 +230,13 @@ def _diagonalised(inertia: Any) -> tuple[Any, tuple[tuple[float, ...], ...] | No
     return moments.tolist(), tuple(tuple(row) for row in axes.tolist())
 
 
-def _kernels(model: PrincipalBody) -> tuple[Kernel, ...]:
+def _kernels(model: PrincipalBody, namespace: str = NAMESPACE) -> tuple[Kernel, ...]:
     make = euler_kernels
     return (
-        make.to_slow(model, NAMESPACE),
-        make.from_slow(model, NAMESPACE),
-        make.frequency(model, NAMESPACE),
-        make.constants_of_motion(model, NAMESPACE),
+        make.to_slow(model, namespace),
+        make.from_slow(model, namespace),
+        make.frequency(model, namespace),
+        make.constants_of_motion(model, namespace),
     )
 
 

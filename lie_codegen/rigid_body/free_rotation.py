@@ -16,7 +16,7 @@ from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body.inertia_matrix import SPHERE, principal_axes
-from lie_codegen.rigid_body.rotation_kernels import MOTION, free_rotation_kernels
+from lie_codegen.rigid_body.rotation_kernels import MOTION, NAMESPACE, free_rotation_kernels
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 
@@ -41,9 +41,13 @@ class FreeRotation(Saved):
     motion: dict[str, Array] = field(repr=False)
     fixed: NDArray[np.bool_] = field(repr=False)
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """prepare and at, of any body, for lc.build and lc.generate."""
-        return free_rotation_kernels()
+    def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """prepare and at, of any body, for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol.
+        """
+        return free_rotation_kernels(name)
 
     @property
     def H(self) -> Array:

@@ -17,7 +17,7 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body.free_rotation import FreeRotation, rotation_about
 from lie_codegen.rigid_body.inertia_matrix import principal_axes
 from lie_codegen.rigid_body.torques import Torque
-from lie_codegen.rigid_body.tumbling_kernels import tumbling_kernels
+from lie_codegen.rigid_body.tumbling_kernels import NAMESPACE, tumbling_kernels
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import Field
 
@@ -42,9 +42,13 @@ class TumblingBody(Saved):
     J: Array
     torques: tuple[Torque, ...]
 
-    def kernels(self) -> tuple[Kernel, ...]:
-        """slow_rate, shape, ends, periodic, torque_at and direct_rate, for lc.build and lc.generate."""
-        return tumbling_kernels(self.J, self.torques)
+    def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
+        """slow_rate, shape, ends, periodic, torque_at and direct_rate, for lc.build and lc.generate.
+
+        Args:
+            name: C identifier that begins every symbol.
+        """
+        return tumbling_kernels(self.J, self.torques, name)
 
     @cached_property
     def library(self) -> Library:

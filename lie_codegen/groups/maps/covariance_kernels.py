@@ -30,6 +30,7 @@ from lie_codegen.kernel.brackets import ad
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matadd, matmul, matvec, number, scaled, transpose
+from lie_codegen.kernel.renaming import in_namespace
 
 #: Doublings of the step and terms of its series: exact to rounding for |ad_u| T up to 16.
 _DOUBLINGS = 4
@@ -39,16 +40,25 @@ _BARYCENTRE = "Pennec and Arsigny, exponential barycentres (2013)"
 
 
 @kernel_factory(group=as_group)
-def covariance_kernels(group: MatrixGroup | str | Path, order: Literal[2, 4] = 4) -> tuple[Kernel, ...]:
-    """The kernels of this page for a group; `order` is that of `compound`.
+def covariance_kernels(
+    group: MatrixGroup | str | Path, order: Literal[2, 4] = 4, *, name: str | None = None
+) -> tuple[Kernel, ...]:
+    """The kernels of this page for a group.
+
+    Args:
+        group: object, catalogue name or file.
+        order: of `compound`, 2 or 4.
+        name: C identifier that begins every symbol; the group's name if None.
 
     Raises:
         InputError: another order.
+        IdentifierError: the name is no C identifier.
     """
     if order not in (2, 4):
         raise InputError(f"covariance_kernels: order is 2 or 4, given {order!r}")
     data = GroupDerivation(as_group(group))
-    return (_compound(data, order), _inverse(data), _flow(data), _mean_term(data), _fuse_term(data))
+    kernels = (_compound(data, order), _inverse(data), _flow(data), _mean_term(data), _fuse_term(data))
+    return in_namespace(kernels, name)
 
 
 def _compound(data: GroupDerivation, order: int) -> Kernel:

@@ -52,12 +52,13 @@ def rotation_entries(q: Sequence[Scalar], places: Sequence[int]) -> Matrix:
 
 
 @kernel_factory()
-def with_quaternion(law: Kernel, *, order: str | None = None) -> Kernel:
+def with_quaternion(law: Kernel, *, order: str | None = None, name: str | None = None) -> Kernel:
     """The same law with its (3, 3) inputs X and X_d as unit quaternions q and q_d.
 
     Args:
         law: an attitude law or a tracking law on SO(3).
         order: "scalar_first" ("wxyz") or "scalar_last" ("xyzw").
+        name: C identifier; the law's own if None.
 
     Raises:
         InputError: the order is not given.
@@ -88,7 +89,12 @@ def with_quaternion(law: Kernel, *, order: str | None = None) -> Kernel:
         for k, port in enumerate(law.inputs)
     )
     return replace(
-        law, inputs=ports, body=body, sampler=sampler, formula=f"{law.formula}; attitude as a quaternion {words}"
+        law,
+        name=name or law.name,
+        inputs=ports,
+        body=body,
+        sampler=sampler,
+        formula=f"{law.formula}; attitude as a quaternion {words}",
     )
 
 
