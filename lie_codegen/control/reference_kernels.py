@@ -29,7 +29,7 @@ from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
 from lie_codegen.groups.wei_norman.body import WeiNormanData, body_velocity, product_exp
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
-from lie_codegen.kernel.definition import doubles, kernel_factory, record_factory
+from lie_codegen.kernel.definition import double, doubles, kernel_factory, record_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -229,6 +229,10 @@ def reference(
         if formulas is not None:
             raise InputError("reference: give the plan as plan= or in the place of formulas, not both")
         formulas = plan
+    # A reference that is made again from its definition is given texts such as "1/100000000".
+    duration, smoothing, tolerance = (
+        double(each) if isinstance(each, str) else each for each in (duration, smoothing, tolerance)
+    )
     if duration is not None:
         if not all(hasattr(formulas, name) for name in ("X", "u", "duration")):
             raise InputError("reference: duration= goes with a plan")
@@ -250,7 +254,7 @@ def reference(
         formulas = cast(Sequence[Any], formulas)
         return formula_reference(group, formulas, start=start)
     made = waypoint_reference if samples is None else sampled_reference
-    return made(group, np.asarray(times), np.asarray(points))
+    return made(group, np.asarray(doubles(times)), np.asarray(doubles(points)))
 
 
 def _on_manifold(space: Manifold, formulas: Any) -> CurveReference:

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
+from lie_codegen.kernel.plain_data import made_from
 
 SO3 = lc.group("so3")
 TARGET = expm(SO3.hat(np.array([0.3, 0.2, 0.8])))
@@ -145,3 +146,16 @@ def test_what_cannot_be_flown_is_refused() -> None:
     law = lc.tracking_law("so3", inertia=INERTIA, error="so3_right", gains={"K_p": [3, 2, 1], "K_d": 4})
     with pytest.raises(lc.errors.InputError, match=r"known on \[0, 4\], not up to t = 5"):
         lc.closed_loop("so3", inertia=INERTIA, law=law, reference=lc.reference("so3", plan), t=np.linspace(0, 5, 11))
+
+
+def test_its_definition_makes_it_again() -> None:
+    """A loop that is known by its definition is given texts: "1/10" for a time, "1/100000000" for the tolerance."""
+    plan = lc.steer("so3", (0.1, 0.05, 0.08), ("w1", "w2"), 24.0, method="four_phase")
+    turns = [np.eye(3)] * 3
+    for made in (
+        lc.reference("so3", plan, smoothing=0.1),
+        lc.reference("so3", plan=plan, duration=30.5, tolerance=1e-7),
+        lc.reference("so3", times=[0, 0.5, 1.1], waypoints=turns),
+        lc.reference("so3", times=[0, 0.5, 1.1, 1.5, 2], samples=[np.eye(3)] * 5),
+    ):
+        assert made_from(made.definition) == made
