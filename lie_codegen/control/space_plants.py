@@ -1,9 +1,8 @@
-"""Plants that are on no group: spheres, mechanisms in coordinates, Lagrangian systems, and those under a vibration.
+"""Plants that are on no group: spheres, mechanisms in coordinates, Lagrangian systems.
 
 sphere        q'' = F - |q'|^2 q,  |q| = 1, the command F taken to the tangent space
 mechanism     M(q) q'' + C(q, q') q' + dV = F
 Lagrangian    M(q) q'' = dL/dq - d(M v + b)/dq v + f - dD/dv + B(q) u
-vibrated      (q, v)' = X(q, v) + Y_a u^a(tau; alpha)/eps,  tau = t/eps, the command alpha
 """
 
 from __future__ import annotations
@@ -31,9 +30,6 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, minus, plus, scaled
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
-from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
-from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
-from lie_codegen.mechanics.vibrational_law import feedback_kernels
 from lie_codegen.on_demand import sympy as sp
 
 #: (ops, t, q, v, command) -> the rate of v.
@@ -245,41 +241,6 @@ def lagrangian_plant(system: LagrangianSystem) -> SpacePlant:
         return total
 
     return SpacePlant("_".join(("system", *system.coordinates)), n, len(columns), 2, acceleration)
-
-
-def vibrated(design: VibrationalFeedback) -> tuple[SpacePlant, Kernel, float]:
-    """The system that a vibrational feedback was designed for, the law of its amplitudes, and the period of its calls [s].
-
-    Theorem 2 of Sanyal, Bloch and McClamroch, corrected: the amplitude is switched once a period of the vibration, where the primitive
-    of the input is zero.
-    """
-    fields, n = design.fields, len(design.fields.state) // 2
-    named = {kernel.name: kernel for kernel in vibrational_kernels(fields, "vibrated")}
-    command = next(kernel for kernel in feedback_kernels(design, "vibrated") if kernel.name == "command")
-
-    def acceleration(ops: Arithmetic, t: Scalar, q: Vector, v: Vector, alpha: Vector) -> Vector:
-        held = iter(alpha)
-        given = [
-            next(held) if str(p) in design.amplitudes else ops.constant(design.values[p]) for p in fields.parameters
-        ]
-        fast = design.switch_phase + t / design.eps
-        return list(named["actual"].evaluate(ops, [*q, *v], fast, design.eps, *given)[0][n:])
-
-    def body(ops: Arithmetic, q: Vector, v: Vector, held: Vector) -> tuple[Any, ...]:
-        (alpha,) = command.evaluate(ops, [*q, *v], held)
-        return alpha, alpha
-
-    size = len(design.amplitudes)
-    law = Kernel(
-        "vibrational_law",
-        "vibrated",
-        (Port("q", (n,)), Port("q_dot", (n,)), Port("held", (size,), description="amplitudes of the period that ends")),
-        (Port("alpha", (size,), description=", ".join(design.amplitudes)), Port("held_next", (size,))),
-        body,
-        command.formula,
-        command.source,
-    )
-    return SpacePlant("vibrated", n, size, 2, acceleration), law, float(fields.period) * design.eps
 
 
 def named_plant(group: Any, law: Kernel | None, inertia: Any, order: int | None) -> Plant | None:

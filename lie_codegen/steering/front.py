@@ -16,17 +16,14 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.runtime.patience import shows_progress
+from lie_codegen.steering.choice import asks_direct, asks_open
 from lie_codegen.steering.constraints import Obstacle
-from lie_codegen.steering.direct.front import asks_direct, direct_plan
-from lie_codegen.steering.feedback import feedback
 from lie_codegen.steering.goal_plans import set_plan
 from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by
-from lie_codegen.steering.ocp.steered import asks_open, open_plan
 from lie_codegen.steering.options import check_options
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.start import placed, seen_from
-from lie_codegen.steering.symmetric_product.method import symmetric_product_plan
 from lie_codegen.steering.task import make_task
 
 
@@ -262,17 +259,28 @@ def _planned(
     tolerance: float,
     options: dict[str, Any],
 ) -> Plan:
+    # what one method alone needs is imported with it: half of the time of a first plan
     if asks_open(method, options):
+        from lie_codegen.steering.ocp.steered import open_plan
+
         return open_plan(group, target, controls, duration, tolerance, **options)
     if asks_direct(method, target, controls, options):
+        from lie_codegen.steering.direct.front import direct_plan
+
         return direct_plan(group, target, controls, duration, tolerance, options)
     if isinstance(target, GoalSet):
         return set_plan(group, target, controls, duration, method, tolerance, options)
     if method == "symmetric_product" and options.get("start") is None:
+        from lie_codegen.steering.symmetric_product.method import symmetric_product_plan
+
         return symmetric_product_plan(group, target, controls, duration, tolerance, options)
     if options.get("start") is not None:
         return _from(group, target, controls, duration, method, tolerance, options)
-    methods = {**OPEN_LOOP, "feedback": feedback}
+    methods = dict(OPEN_LOOP)
+    if method not in methods and method != "auto":
+        from lie_codegen.steering.feedback import feedback
+
+        methods["feedback"] = feedback
     torques = options.get("dynamics") == "second_order"
     task = make_task(group, target, controls, duration, tolerance, torques=torques, drift=options.get("drift"))
     return plan_by(methods, method, task, options)

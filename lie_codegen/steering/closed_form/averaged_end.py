@@ -13,7 +13,6 @@ from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -87,9 +86,9 @@ def _forms(group: MatrixGroup, controls: tuple[int, ...], harmonics: int) -> tup
 def _nodes(count: int) -> tuple[Array, Array]:
     """Chebyshev points of [0, 1] with both ends, and the matrix that integrates from 0 to each."""
     x = -np.cos(np.pi * np.arange(count) / (count - 1))
-    integrals = chebyshev.chebint(np.eye(count), lbnd=-1)
-    running = chebyshev.chebvander(x, count) @ integrals / 2
-    return (x + 1) / 2, np.asarray(running @ np.linalg.inv(chebyshev.chebvander(x, count - 1)))
+    integrals = np.polynomial.chebyshev.chebint(np.eye(count), lbnd=-1)
+    running = np.polynomial.chebyshev.chebvander(x, count) @ integrals / 2
+    return (x + 1) / 2, np.asarray(running @ np.linalg.inv(np.polynomial.chebyshev.chebvander(x, count - 1)))
 
 
 def _iterated(U: Array, directions: Array, integral: Array, order: int) -> tuple[list[Array], list[Array]]:

@@ -22,14 +22,7 @@ from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 if TYPE_CHECKING:
     from lie_codegen.steering.ocp.problem import OptimalControlProblem
 
-#: Options that no other method has.
-_OWN = {"cost", "terminal_cost", "constraints", "parameters"}
 _GOAL = "steer_goal"
-
-
-def asks_open(method: str, options: Mapping[str, Any]) -> bool:
-    """Whether a problem of one's own is meant."""
-    return method == "ocp" or (method == "auto" and any(options.get(name) is not None for name in _OWN))
 
 
 def open_plan(

@@ -1,0 +1,57 @@
+"""Which kind of steering is meant, before the code of any is imported: a first plan by shooting needs no other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.steering.goals import GoalSet
+
+#: Options that no other method than "ocp" has, and none other than "direct".
+_OPEN = {"cost", "terminal_cost", "constraints", "parameters"}
+_DIRECT = {"equation", "spread", "rounds", "pieces", "iterations", "seed", "polish", "vertices"}
+#: Options with which "auto" is surer by reaching first.
+_SURER = {"bounds", "drift"}
+
+
+def asks_open(method: str, options: Mapping[str, Any]) -> bool:
+    """Whether a problem of one's own is meant."""
+    return method == "ocp" or (method == "auto" and any(options.get(name) is not None for name in _OPEN))
+
+
+def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapping[str, Any]) -> bool:
+    """Whether the direct method is meant."""
+    if method != "auto":
+        return method == "direct"
+    given = {name for name, value in options.items() if value is not None}
+    if given & _DIRECT or options.get("objective") == "fuel":
+        return True
+    if isinstance(target, GoalSet):
+        return _only_direct(given)  # what it has no option for goes to a method that moves along the set
+    if given & {"start", "guess"} and _only_direct(given):
+        return True
+    if any(not isinstance(each, str | int | np.integer) for each in controls) or callable(options.get("drift")):
+        return True
+    if not given & _SURER or not _only_direct(given):
+        return False
+    objective = options.get("objective", "energy")
+    if objective == "time" and options.get("vertices") is not None:
+        return True
+    return objective == "energy" or (objective == "time" and _bounded(options.get("bounds"), controls))
+
+
+def _only_direct(given: set[str]) -> bool:
+    """Whether the direct method has all these options."""
+    from lie_codegen.steering.direct.front import direct_options
+
+    return given <= direct_options()
+
+
+def _bounded(bounds: Any, controls: Sequence[Any]) -> bool:
+    """Whether every one of few controls is bounded, as words of arcs need it."""
+    from lie_codegen.steering.direct.least_time import MOST_CONTROLS
+
+    some = not isinstance(bounds, Mapping) or len(bounds) == len(controls)
+    return bounds is not None and some and len(controls) <= MOST_CONTROLS
