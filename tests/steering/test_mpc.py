@@ -308,7 +308,7 @@ def test_without_a_compiler_numpy_controls(monkeypatch: pytest.MonkeyPatch) -> N
     compiled = lc.mpc(problem)
     plan = compiled.reset(X0=rotation((0.6, 0, 0)), q=2.0, Xd=rotation((0, 1.5, 0)))
     machine = InterpretedMachine(problem.data, ModelBuilder(problem.data).build(second_order=False))
-    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.mpc"), "loop_machine", lambda data: machine)
+    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.controller"), "loop_machine", lambda data: machine)
     twin = lc.mpc(problem)
     twin.reset(plan)
     rng = np.random.default_rng(0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.maps.element_pattern import varying_entries
-from lie_codegen.steering.ocp.model import Model
+from lie_codegen.steering.ocp.model_sizes import Model
 from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
 
 #: Arguments, their derivatives and the stages' own derivatives, the total and its derivative, Ad(exp(-total)), the right Jacobian.

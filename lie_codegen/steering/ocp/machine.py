@@ -14,7 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.steering.ocp.machine_base import Machine
-from lie_codegen.steering.ocp.model import Sizes
+from lie_codegen.steering.ocp.model_sizes import Sizes
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.source import render_solver, solver_view
 

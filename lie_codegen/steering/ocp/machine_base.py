@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.steering.ocp.model import Sizes
+from lie_codegen.steering.ocp.model_sizes import Sizes
 from lie_codegen.steering.ocp.problem_data import ProblemData
 
 #: How a sample ended, as the C says it.

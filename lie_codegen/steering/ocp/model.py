@@ -14,7 +14,6 @@ that order. (The same as lambda . vee(D - D^2 / 2) with D = M - I: without D^2 /
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
@@ -28,48 +27,13 @@ from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import matmul
 from lie_codegen.on_demand import casadi as ca
+from lie_codegen.steering.ocp.model_sizes import Model, Sizes
 from lie_codegen.steering.ocp.problem_data import ProblemData, total_square
 from lie_codegen.steering.ocp.terms import Point, derivation
 
 _OPS = CasadiArithmetic()
 #: Terms of the series of J_r' lambda: to 1e-12 for |ad theta| <= 1, and curvature alone depends on it.
 _SERIES = 16
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """Numbers of everything: group, other states, stored matrix entries, controls, parameters, conditions."""
-
-    dim: int
-    q: int
-    packed: int
-    m: int
-    parameters: int
-    path: int
-    end_path: int
-    end: int
-
-    @property
-    def nx(self) -> int:
-        """Local coordinates of a state."""
-        return self.dim + self.q
-
-
-@dataclass(frozen=True)
-class Model:
-    """Functions by the names that the core calls them by.
-
-    Attributes:
-        sizes: numbers of everything.
-        functions: CasADi SX functions, or () where none were asked for.
-        needs_control: for each row of g, whether a control enters it.
-        row_names: of the rows of g, then of those at the end.
-    """
-
-    sizes: Sizes
-    functions: tuple[Any, ...]
-    needs_control: tuple[bool, ...]
-    row_names: tuple[str, ...]
 
 
 class ModelBuilder:

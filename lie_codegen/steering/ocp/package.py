@@ -17,7 +17,8 @@ from lie_codegen.errors import CodegenError
 from lie_codegen.on_demand import scipy
 from lie_codegen.steering.ocp.budget import Budget, budget_of
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
-from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
+from lie_codegen.steering.ocp.interpreted import InterpretedMachine
+from lie_codegen.steering.ocp.interpreted_merit import Run
 from lie_codegen.steering.ocp.machine_base import HELD
 from lie_codegen.steering.ocp.plan import OptimalPlan
 from lie_codegen.steering.ocp.source import CORE, SolverView, render_solver, solver_view

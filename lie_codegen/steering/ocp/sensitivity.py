@@ -18,7 +18,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionWarning, InputError
 from lie_codegen.groups.maps.element_pattern import varying_entries
-from lie_codegen.steering.ocp.interpreted import InterpretedMachine, Run
+from lie_codegen.steering.ocp.interpreted import InterpretedMachine
+from lie_codegen.steering.ocp.interpreted_merit import Run
 from lie_codegen.steering.ocp.interpreted_model import InterpretedModel
 from lie_codegen.steering.ocp.layout import Layout
 from lie_codegen.steering.ocp.machine import machine_of

@@ -11,7 +11,8 @@ from lie_codegen.codegen.templates import render, template_folder
 from lie_codegen.codegen.views import KernelView, comment_lines, kernel_view
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.steering.ocp.model import Model, ModelBuilder
+from lie_codegen.steering.ocp.model import ModelBuilder
+from lie_codegen.steering.ocp.model_sizes import Model
 from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
 from lie_codegen.steering.ocp.terms import name_of
 
