@@ -91,3 +91,24 @@ def sizes() -> Kernel:
 
     ports = (Port("a", (5,)), Port("b", (7,)), Port("c", (11,)), Port("d", (3, 6)))
     return Kernel("sizes", "toy", ports, (Port("e", (11,)), Port("f", (3, 6)), Port("g", (7,))), body)
+
+
+def sided() -> Kernel:
+    """Choices whose sides have roots, sines and divisions of their own: one within the other, a pair read outside, a shared part."""
+
+    def body(ops: Any, x: Any) -> tuple[Any, ...]:
+        size = x[0] * x[0] + x[1] * x[1]
+        near, close = size < 1, x[1] < 0.5
+        root = ca.sqrt(size)
+        sine, cosine = ca.sin(root), ca.cos(root)
+        far = sine / root + (1 - cosine) / (root * size)
+        within = ca.if_else(close, ca.exp(x[1]) / (2 + ca.sin(x[0])), ca.sqrt(2 + x[0]) / (3 + ca.cos(x[1])))
+        return [
+            ca.if_else(near, 1 - size / 6, far),
+            ca.if_else(near, size, sine),
+            ca.if_else(near, within, ca.exp(x[0]) / root),
+            ca.if_else(close, x[0], ca.if_else(near, ca.log(3 + x[0]) / (1 + ca.exp(x[1])), 2)),
+            root * ca.if_else(near, 2, 3),
+        ], near
+
+    return Kernel("sided", "toy", (Port("x", (2,)),), (Port("z", (5,)), Port("near", ())), body)

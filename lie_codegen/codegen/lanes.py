@@ -2,89 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
 from lie_codegen.codegen.lane_coefficients import HALF_PI, HALF_PI_PARTS, LOG2_PARTS, POLYNOMIALS
+from lie_codegen.codegen.lane_forms import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, OF_MASKS, SLOW_FORMS
 from lie_codegen.codegen.lane_networks import networks
 from lie_codegen.codegen.opcodes import c_literal
 from lie_codegen.codegen.reciprocals import with_shared_reciprocals
+from lie_codegen.codegen.skips import Skip, with_skips
 from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Statement, Tape
 from lie_codegen.codegen.templates import render
 from lie_codegen.errors import CodegenError
 
-#: Operation -> C expression over vectors {0}, {1}, {2}.
-LANE_FORMS: Mapping[str, str] = {
-    "ASSIGN": "{0}",
-    "LIFT": "{0}",
-    "ADD": "{0} + {1}",
-    "SUB": "{0} - {1}",
-    "MUL": "{0} * {1}",
-    "DIV": "{0} / {1}",
-    "NEG": "-{0}",
-    "INV": "1.0 / {0}",
-    "TWICE": "2.0 * {0}",
-    "SQ": "{0} * {0}",
-    "SQRT": "lcg_sqrt({0})",
-    "EXP": "lcg_exp({0})",
-    "EXPM1": "lcg_expm1({0})",
-    "LOG": "lcg_log({0})",
-    "SIN": "lcg_sin({0})",
-    "COS": "lcg_cos({0})",
-    "TAN": "lcg_tan({0})",
-    "ASIN": "lcg_asin({0})",
-    "ACOS": "lcg_acos({0})",
-    "ATAN": "lcg_atan({0})",
-    "ATAN2": "lcg_atan2({0}, {1})",
-    "SINH": "lcg_sinh({0})",
-    "COSH": "lcg_cosh({0})",
-    "TANH": "lcg_tanh({0})",
-    "FABS": "lcg_fabs({0})",
-    "FLOOR": "lcg_floor({0})",
-    "CEIL": "lcg_ceil({0})",
-    "COPYSIGN": "lcg_copysign({0}, {1})",
-    "FMIN": "lcg_fmin({0}, {1})",
-    "FMAX": "lcg_fmax({0}, {1})",
-    "SIGN": "lcg_sign({0})",
-}
-#: Of conditions: the operands of the first four are numbers, of the others conditions; the result is a mask.
-MASK_FORMS: Mapping[str, str] = {
-    "LT": "lcg_lt({0}, {1})",
-    "LE": "lcg_le({0}, {1})",
-    "EQ": "lcg_eq({0}, {1})",
-    "NE": "lcg_ne({0}, {1})",
-    "NOT": "lcg_not({0})",
-    "AND": "(lcg_m)({0} & {1})",
-    "OR": "(lcg_m)({0} | {1})",
-}
 #: Statements from which a body is a function of its own.
 INLINE = 400
 #: Statements from which a body is not interleaved with its twin: the processor then finds enough independent work in one
 #: vector of samples, and two run out of registers (measured: 204 and 258 statements gain a sixth and a quarter, 289 lose a tenth).
 TWIN = 260
-_OF_MASKS = frozenset({"NOT", "AND", "OR"})
-#: The first operand is a condition.
-CHOICE_FORMS: Mapping[str, str] = {
-    "IF_ELSE_ZERO": "lcg_select({0}, {1}, lcg_splat(0.0))",
-    "SELECT": "lcg_select({0}, {1}, {2})",
-}
-#: Without a lane form: libm, one lane after another. The build log says so.
-SLOW_FORMS: Mapping[str, str] = {
-    "POW": "lcg_each2(pow, {0}, {1})",
-    "CONSTPOW": "lcg_each2(pow, {0}, {1})",
-    "LOG1P": "lcg_each(log1p, {0})",
-    "ASINH": "lcg_each(asinh, {0})",
-    "ACOSH": "lcg_each(acosh, {0})",
-    "ATANH": "lcg_each(atanh, {0})",
-    "ERF": "lcg_each(erf, {0})",
-    "HYPOT": "lcg_each2(hypot, {0}, {1})",
-    "FMOD": "lcg_each2(fmod, {0}, {1})",
-    "REMAINDER": "lcg_each2(remainder, {0}, {1})",
-}
 
 
 @dataclass(frozen=True)
@@ -102,6 +41,39 @@ class LaneStatement:
         if not self.results:
             return f"const {self.type} {self.name} = {self.expression};"
         return f"{self.type} {self.name}[{self.results}]; {self.expression};"
+
+
+@dataclass(frozen=True)
+class LaneBlock:
+    """Statements that are skipped where no lane needs them; the choices after them read `results`, zeros then.
+
+    Attributes:
+        condition: a mask of the lanes that need them.
+        results: names.
+        statements: inside.
+    """
+
+    condition: str
+    results: tuple[str, ...]
+    statements: tuple[LaneStatement, ...]
+
+    @property
+    def text(self) -> str:
+        """As C."""
+        return self.beside(self.statements, self.results, f"lcg_some({self.condition})")
+
+    def with_twin(self, twin: LaneBlock) -> str:
+        """As C, with the same for other samples."""
+        both = [each for pair in zip(self.statements, twin.statements, strict=True) for each in pair]
+        some = f"lcg_some((lcg_m)({self.condition} | {twin.condition}))"
+        return self.beside(both, (*self.results, *twin.results), some)
+
+    @staticmethod
+    def beside(statements: Sequence[LaneStatement], results: Sequence[str], some: str) -> str:
+        """Zeros, then the statements where `some`."""
+        zeros = ", ".join(f"{name} = lcg_splat(0.0)" for name in results)
+        inside = [f"{s.name} = {s.expression};" if s.name in results else s.text for s in statements]
+        return "\n    ".join([f"lcg_v {zeros};", f"if ({some}) {{", *(f"    {line}" for line in inside), "}"])
 
 
 @dataclass(frozen=True)
@@ -125,7 +97,7 @@ class LaneBody:
             first in every port. Only for short bodies.
     """
 
-    statements: tuple[LaneStatement, ...]
+    statements: tuple[LaneStatement | LaneBlock, ...]
     stores: tuple[LaneStore, ...]
     slow: tuple[str, ...]
     read: frozenset[int]
@@ -136,7 +108,25 @@ class LaneBody:
     @property
     def inline(self) -> bool:
         """Whether the loops hold it, instead of calling it."""
-        return len(self.statements) < INLINE
+        return self.size < INLINE
+
+    @property
+    def size(self) -> int:
+        """Number of statements, those in blocks too."""
+        return sum(len(s.statements) if isinstance(s, LaneBlock) else 1 for s in self.statements)
+
+    @property
+    def together(self) -> list[str]:
+        """The statements as C, each followed by its twin; blocks are skipped together."""
+        lines: list[str] = []
+        if self.twin is None:
+            return [each.text for each in self.statements]
+        for one, other in zip(self.statements, self.twin.statements, strict=True):
+            if isinstance(one, LaneBlock) and isinstance(other, LaneBlock):
+                lines.append(one.with_twin(other))
+            else:
+                lines += [one.text, other.text]
+        return lines
 
 
 @dataclass(frozen=True)
@@ -157,7 +147,7 @@ def lane_body(tape: Tape, sizes: Sequence[int]) -> LaneBody:
     pieces = split(tape, ports)
     if pieces is None:
         body = _body(tape)
-        return replace(body, twin=_twin(tape, sizes)) if len(body.statements) < TWIN else body
+        return replace(body, twin=_twin(tape, sizes)) if body.size < TWIN else body
     parts = []
     for part in pieces.parts:
         body = _body(part.tape, ports)
@@ -185,8 +175,11 @@ def _body(tape: Tape, work: int = -1) -> LaneBody:
 
 
 def _emitted(tape: Tape, emitter: _Emitter) -> LaneBody:
-    for index, statement in enumerate(tape.statements):
-        emitter.emit(index, statement)
+    for each in with_skips(tape):
+        if isinstance(each, int):
+            emitter.emit(each, tape.statements[each])
+        else:
+            emitter.emit_skip(each, tape)
     return LaneBody(
         statements=tuple(emitter.done),
         stores=tuple(
@@ -214,7 +207,7 @@ class _Emitter:
     def __init__(self, tape: Tape, work: int, names: _Names = _Names()) -> None:
         self._work = work
         self._names = names
-        self.done: list[LaneStatement] = []
+        self.done: list[LaneStatement | LaneBlock] = []
         self._numbers: dict[int, str] = {}
         self._masks: dict[int, str] = {}
         operands = {op: {s.operands for s in tape.statements if s.op == op} for op in ("SIN", "COS")}
@@ -246,7 +239,7 @@ class _Emitter:
         elif op == "RESULT":
             self._numbers[index] = f"{self._numbers[operands[0]]}[{statement.slot[0]}]"
         elif op in MASK_FORMS:
-            of = self._mask if op in _OF_MASKS else self.number
+            of = self._mask if op in OF_MASKS else self.number
             self._add("lcg_m", index, MASK_FORMS[op].format(*[of(i) for i in operands]))
         elif op in CHOICE_FORMS:
             rest = [self.number(i) for i in operands[1:]]
@@ -256,6 +249,19 @@ class _Emitter:
             if form is None:
                 raise CodegenError(f"operation {op} has no lane form: write the kernel without it")
             self._add("lcg_v", index, form.format(*[self.number(i) for i in operands]))
+
+    def emit_skip(self, skip: Skip, tape: Tape) -> None:
+        """A block; sines and cosines inside are declared inside."""
+        before, self.done = self.done, []
+        for index in skip.members:
+            self.emit(index, tape.statements[index])
+        for index in skip.results:
+            if "." in self._numbers[index]:  # one of a pair: a name of its own is seen outside
+                self._add("lcg_v", index, self._numbers[index])
+        inside = tuple(each for each in self.done if isinstance(each, LaneStatement))
+        mask = self._mask(skip.condition)
+        names = tuple(self._numbers[index] for index in skip.results)
+        self.done = [*before, LaneBlock(mask if skip.holds else f"lcg_not({mask})", names, inside)]
 
     def _call(self, index: int, statement: Statement) -> None:
         """One sample after another; a routine leaves its loops when its own numbers say so."""

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 import toy_kernels
-from operation_kernels import every_operation, mixed, sizes
+from operation_kernels import every_operation, mixed, sided, sizes
 
-from lie_codegen.codegen.lanes import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, SLOW_FORMS
+from lie_codegen.codegen.lane_forms import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, SLOW_FORMS
 from lie_codegen.codegen.opcodes import C99_FORMS
 from lie_codegen.codegen.package import render_library
 from lie_codegen.codegen.reciprocals import with_shared_reciprocals
@@ -32,7 +32,7 @@ CLOSE: dict[str, Any] = {"rtol": 2e-15, "atol": 5e-16}
 pytestmark = pytest.mark.skipif(not find_compilers(), reason="needs a C compiler")
 
 
-KERNELS = (*toy_kernels.KERNELS, every_operation(), mixed(), sizes())
+KERNELS = (*toy_kernels.KERNELS, every_operation(), mixed(), sizes(), sided())
 
 
 @pytest.fixture(scope="module", params=MACHINES)
@@ -86,6 +86,18 @@ def test_conditions_are_numbers_and_numbers_conditions(lib: Library, oracle: Lib
     x[3, 2] = np.nan
     for got, expected in zip(lib.mixed.batch(x, y, unread), oracle.mixed.batch(x, y, unread), strict=True):
         np.testing.assert_array_equal(got, expected)
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 9.0])
+def test_what_no_lane_needs_is_skipped_and_nothing_else(lib: Library, oracle: Library, scale: float) -> None:
+    """All lanes on one side, on both sides, all on the other."""
+    x = np.random.default_rng(8).normal(size=(203, 2)) * scale
+    x[17] = np.nan
+    for got, expected in zip(lib.sided.batch(x), oracle.sided.batch(x), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=4e-15, atol=1e-15)
+    kept = np.delete(x, 17, axis=0)
+    for one, whole in zip(lib.sided.batch(kept[:1]), lib.sided.batch(kept), strict=True):
+        np.testing.assert_array_equal(one[0], whole[0])
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 31])

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from lie_codegen.codegen.lane_coefficients import POLYNOMIALS
-from lie_codegen.codegen.lanes import LANE_FORMS, lanes_header
+from lie_codegen.codegen.lane_forms import LANE_FORMS
+from lie_codegen.codegen.lanes import lanes_header
 from lie_codegen.runtime.compiler import FLAGS, find_compilers
 
 HERE = Path(__file__).resolve().parent
