@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,8 +68,16 @@ class Orbit(Linearised, Saved):
         return _system(self.kernels).motion(self.start, self.period)
 
 
+@runtime_checkable
+class AveragedFlow(Protocol):
+    """An average whose slow variables have a flow of their own: of lc.phase_average, lc.time_average, lc.euler_average."""
+
+    def slow_field(self) -> Kernel:
+        """(x, eps[, order]) -> x'."""
+
+
 def floquet(
-    rates: Sequence[Any] | Kernel | VibrationalAverage | ClosedLoop,
+    rates: Sequence[Any] | Kernel | VibrationalAverage | AveragedFlow | ClosedLoop,
     variables: Sequence[str] | None = None,
     guess: ArrayLike | None = None,
     *,
@@ -86,7 +94,9 @@ def floquet(
     Args:
         rates: n formulas in the variables, t and the parameters; or a kernel whose first input is y, with an input t or
             none, and whose first output is y' (`parameters` then gives its other inputs); or a vibrational average, whose
-            actual system it then is, the true loop (`parameters` gives eps; its period is known); or a run of lc.closed_loop
+            actual system it then is, the true loop (`parameters` gives eps; its period is known); or an average of
+            lc.phase_average, lc.time_average or lc.euler_average, whose slow flow it then is, differentiated exactly
+            (`parameters` gives eps, and order 1 or 2 where there is a phase); or a run of lc.closed_loop
             on a matrix group, whose last state is the guess: then X' = X hat(xi), and a `LoopOrbit` is returned.
         variables: (n,) names.
         guess: (n,) a point near the orbit; of several orbits the answer is the one that belongs to the guess.
@@ -132,6 +142,10 @@ def floquet(
 
 
 def _read(rates: Any, variables: Any, parameters: Any) -> tuple[Kernel, ...]:
+    if isinstance(rates, AveragedFlow):
+        field = rates.slow_field()
+        order = {"order": 2} if any(port.name == "order" for port in field.inputs) else {}
+        return kernel_orbit_kernels(field, {**order, **dict(parameters or {})})
     if isinstance(rates, Kernel):
         return kernel_orbit_kernels(rates, dict(parameters or {}))
     if variables is None:
@@ -150,6 +164,8 @@ def _system(kernels: tuple[Kernel, ...]) -> OrbitSystem:
 
 def _is_driven(rates: Any, kernels: tuple[Kernel, ...]) -> bool:
     """Whether f depends on t."""
+    if isinstance(rates, AveragedFlow):
+        return False
     if isinstance(rates, Kernel):
         return any(port.name == "t" for port in rates.inputs)
     if kernels[0].definition is None:

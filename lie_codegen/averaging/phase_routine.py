@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +18,8 @@ from lie_codegen.kernel.routine import Routine, call_routine
 #: node(ops, x, phi) -> (F, G), per unit eps; clock(ops, x) -> Lambda. The phase has period 1.
 Node = Callable[[Arithmetic, Sequence[Scalar], Scalar], tuple[list[Scalar], Scalar]]
 Clock = Callable[[Arithmetic, Sequence[Scalar]], Scalar]
+#: Derivatives of them, as kernel bodies.
+Derivative = Callable[..., tuple[Any, ...]]
 
 
 @dataclass(frozen=True)
@@ -69,16 +69,32 @@ def phase_routine(name: str, namespace: str, node: Node, clock: Clock, size: int
     def speed(ops: Arithmetic, x: Any) -> tuple[Any, ...]:
         return clock_derivatives(ops, clock, x)
 
+    def twice(ops: Arithmetic, x: Any, phi: Any, w: Any, v: Any) -> tuple[Any, ...]:
+        dual = DualArithmetic(ops)
+        F, G = _directional(dual, node, [dual.variable(a, {0: b}) for a, b in zip(x, v, strict=True)], phi, w)
+        return [tangent_of(each, 0, dual.level) for each in F], tangent_of(G, 0, dual.level)
+
+    def speed_rate(ops: Arithmetic, x: Any, v: Any) -> tuple[Any, ...]:
+        dual = DualArithmetic(ops)
+        rate, slope, bent = clock_derivatives(
+            dual, clock, [dual.variable(a, {0: b}) for a, b in zip(x, v, strict=True)]
+        )
+        level = dual.level
+        return (
+            tangent_of(rate, 0, level), [tangent_of(each, 0, level) for each in slope],
+            [[tangent_of(each, 0, level) for each in row] for row in bent],
+        )  # fmt: skip
+
+    v, ends = Port("v", (size,)), (F, G)
+    derivatives = (Port("L", ()), Port("slope", (size,)), Port("curvature", (size, size)))
     helpers = (
-        Kernel(f"{name}_node", namespace, (x, phi), (F, G), value),
-        Kernel(f"{name}_node_rate", namespace, (x, phi, w), (F, G), rate),
-        Kernel(
-            f"{name}_clock",
-            namespace,
-            (x,),
-            (Port("L", ()), Port("slope", (size,)), Port("curvature", (size, size))),
-            speed,
-        ),
+        Kernel(f"{name}_node", namespace, (x, phi), ends, value),
+        Kernel(f"{name}_node_rate", namespace, (x, phi, w), ends, rate),
+        Kernel(f"{name}_clock", namespace, (x,), derivatives, speed),
+    )
+    more = (
+        Kernel(f"{name}_node_twice", namespace, (x, phi, w, v), ends, twice),
+        Kernel(f"{name}_clock_rate", namespace, (x, v), derivatives, speed_rate),
     )
     levels = tuple(
         {"limit": repr(float(limit)), "nodes": count, "primitive": [repr(float(p)) for p in primitive(count)]}
@@ -92,7 +108,21 @@ def phase_routine(name: str, namespace: str, node: Node, clock: Clock, size: int
     def twin(values: Sequence[float]) -> Array:
         return phase_terms(node, clock, np.asarray(values[:size]), values[size], values[size + 1] > 1, nodes.at(values))
 
-    return Routine(name, size + 2, 3 * size + 4, "phase_average.c.jinja", settings, helpers, twin, no_tangent)
+    def twin_of_tangent(values: Sequence[float]) -> Array:
+        given = np.asarray(values, dtype=float)
+        return phase_terms_rate(node, clock, twice, speed_rate, given, size, nodes.at(values))
+
+    moved = Routine(
+        f"{name}_tangent", 2 * size + 3, 3 * size + 4, "phase_average_tangent.c.jinja",
+        (*settings, ("node_twice", more[0].symbol), ("clock_rate", more[1].symbol)),
+        (*helpers, *more), twin_of_tangent, no_tangent,
+    )  # fmt: skip
+
+    def tangent(ops: Any, inputs: Sequence[Scalar], outputs: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
+        directions = [ops.constant(0) + each for each in rates[: size + 1]]
+        return call_routine(ops, moved, [*inputs, *directions])
+
+    return Routine(name, size + 2, 3 * size + 4, "phase_average.c.jinja", settings, helpers, twin, tangent)
 
 
 class Frozen(list[Any]):
@@ -156,61 +186,34 @@ def phase_terms(node: Node, clock: Clock, x: Array, phi: float, second_order: bo
     return np.concatenate([F1, [rate, G1], F2, [G2], w[:, 0], [V]])
 
 
-def phase_kernels(
-    routine: Routine, node: Node, clock: Clock, size: int, namespace: str, unit: float = 1.0,
-    sampler: Callable[[random.Random], list[float]] | None = None,
-) -> tuple[Kernel, ...]:  # fmt: skip
-    """terms, near_identity, mean_rate and actual_rate of the system; phases in `unit` a period.
+def phase_terms_rate(
+    node: Node, clock: Clock, twice: Derivative, speed_rate: Derivative, values: Array, n: int, count: int
+) -> Array:
+    """The derivative of `phase_terms` along a direction of (x, phi): `values` are x, phi, order, and the direction."""
+    ops, x, v = FloatArithmetic(), values[:n].tolist(), values[n + 2 : 2 * n + 2].tolist()
+    second_order, turn = values[n + 1] > 1, float(values[2 * n + 2])
+    at = [float(values[n] + j / count) for j in range(count)]
 
-    terms(x) -> (F1, F2, Lambda, G1, G2); near_identity(x, phi) -> (W, V); mean_rate(y, eps, order) -> (x', phi') of the averaged
-    system and actual_rate(y, eps) -> (x', phi') of the true one, y = (x, phi).
-    """
-    n = size
-    x, phi, eps, state = Port("x", (n,)), Port("phi", ()), Port("eps", ()), Port("y", (n + 1,), description="x, phi")
+    def rows(pairs: Sequence[tuple[Any, Any]]) -> tuple[Array, Array]:
+        return np.array([F for F, _ in pairs], dtype=float).T, np.array([G for _, G in pairs], dtype=float)
 
-    def call(ops: Arithmetic, x: Any, phi: Any, order: Any) -> list[Scalar]:
-        return call_routine(ops, routine, [*x, phi / unit, order])
-
-    def terms(ops: Arithmetic, x: Any) -> tuple[Any, ...]:
-        r = call(ops, x, ops.constant(0), ops.constant(2))
-        return r[:n], r[n + 2 : 2 * n + 2], unit * r[n], unit * r[n + 1], unit * r[2 * n + 2]
-
-    def near_identity(ops: Arithmetic, x: Any, phi: Any) -> tuple[Any, ...]:
-        r = call(ops, x, phi, ops.constant(2))
-        return r[2 * n + 3 : 3 * n + 3], unit * r[3 * n + 3]
-
-    def mean_rate(ops: Arithmetic, y: Any, eps: Any, order: Any) -> tuple[Any, ...]:
-        r = call(ops, y[:n], ops.constant(0), order)
-        slow = [eps * (a + eps * b) for a, b in zip(r[:n], r[n + 2 : 2 * n + 2], strict=True)]
-        return ([*slow, unit * (r[n] + eps * (r[n + 1] + eps * r[2 * n + 2]))],)
-
-    def actual_rate(ops: Arithmetic, y: Any, eps: Any) -> tuple[Any, ...]:
-        F, G = node(ops, y[:n], y[n] / unit)
-        return ([*(eps * each for each in F), unit * (clock(ops, y[:n]) + eps * G)],)
-
-    def draw(rng: random.Random) -> list[float]:
-        return sampler(rng) if sampler else [rng.uniform(-1, 1) for _ in range(n)]
-
-    source = "Coppola, The method of averaging for Euler's equations of rigid body motion, (19)-(22)"
-    rate = Port("y_dot", (n + 1,))
-    return (
-        Kernel("terms", namespace, (x,), (Port("F1", (n,)), Port("F2", (n,)), Port("Lambda", ()), Port("G1", ()), Port("G2", ())),
-               terms, "x' = eps F1 + eps^2 F2, phi' = Lambda + eps G1 + eps^2 G2, zero-mean gauge", source, lambda rng: (draw(rng),)),
-        Kernel("near_identity", namespace, (x, phi), (Port("W", (n,)), Port("V", ())), near_identity,
-               "x = y + eps W(y, psi), phi = psi + eps V(y, psi), W and V of zero mean", source, lambda rng: (draw(rng), rng.uniform(0, unit))),
-        Kernel("mean_rate", namespace, (state, eps, Port("order", (), description="1 or 2")), (rate,), mean_rate,
-               "the averaged system", source, lambda rng: ([*draw(rng), 0.0], 0.01, 2.0)),
-        Kernel("actual_rate", namespace, (state, eps), (rate,), actual_rate, "x' = eps F, phi' = Lambda + eps G", source,
-               lambda rng: ([*draw(rng), rng.uniform(0, unit)], 0.01)),
-    )  # fmt: skip
-
-
-def tail(values: Array) -> float:
-    """The last quarter of the Fourier coefficients of samples (..., M) over the largest: what a jump leaves there."""
-    waves = np.abs(np.fft.rfft(values, axis=-1))
-    largest = float(waves.max())
-    return (
-        0.0
-        if largest == 0 or not math.isfinite(largest)
-        else float(waves[..., 3 * waves.shape[-1] // 4 :].max()) / largest
-    )
+    f, g = rows([node(ops, x, each) for each in at])
+    df, dg = rows([_directional(ops, node, x, each, v) for each in at])
+    rate, slope, bent = (np.asarray(each, dtype=float) for each in clock_derivatives(ops, clock, x))
+    drate, dslope, dbent = (np.asarray(each, dtype=float) for each in speed_rate(ops, x, v))
+    P = primitive(count)[(np.arange(count)[:, None] - np.arange(count)) % count]
+    w = f @ P.T / rate
+    dw = (df @ P.T - w * drate) / rate
+    f0, df0, g0, dg0 = f - f.mean(axis=1)[:, None], df - df.mean(axis=1)[:, None], g - g.mean(), dg - dg.mean()
+    drive, ddrive = g0 + slope @ w, dg0 + dslope @ w + slope @ dw
+    dF2, dG2, dV = np.zeros(n), 0.0, 0.0
+    if second_order:
+        pushed, dpushed = drive / rate, (ddrive - drive * drate / rate) / rate
+        bend, g_bend = rows([twice(ops, x, each, w[:, j].tolist(), v) for j, each in enumerate(at)])
+        moved, g_moved = rows([_directional(ops, node, x, each, dw[:, j].tolist()) for j, each in enumerate(at)])
+        dF2 = (bend + moved - df0 * pushed - f0 * dpushed).mean(axis=1)
+        curved = np.einsum("ik,il,lk->k", w, dbent, w) / 2 + np.einsum("ik,il,lk->k", dw, bent, w)
+        dG2 = float((g_bend + g_moved - dg0 * pushed - g0 * dpushed + curved).mean())
+        dV = float(P[0] @ dpushed) + turn * float(pushed[0])
+    W_dot = dw[:, 0] + turn * f0[:, 0] / rate  # Lambda W_phi = F - F1
+    return np.concatenate([df.mean(axis=1), [drate, dg.mean()], dF2, [dG2], W_dot, [dV]])

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.averaging.harmonics import highest_harmonic
 from lie_codegen.averaging.near_identity import GOOD, to_mean
-from lie_codegen.averaging.phase_routine import Nodes, phase_kernels, phase_routine, tail
+from lie_codegen.averaging.phase_kernels import phase_kernels
+from lie_codegen.averaging.phase_routine import Nodes, phase_routine
 from lie_codegen.averaging.vector_field import FieldBody, formula_field, read_formulas
-from lie_codegen.errors import AssumptionError, InputError, PeriodError, ShapeError
+from lie_codegen.errors import InputError, PeriodError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -26,9 +28,8 @@ from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import REACHED, Field, integrate
 
 NAMESPACE = "phase_average"
-_NODES, _MOST_NODES = 16, 256
-#: A last quarter of Fourier coefficients above it, with the most nodes, is that of a jump.
-_SMOOTH = 1e-9
+#: Phases that are tried first.
+_NODES = 16
 
 
 class SlowTerms(NamedTuple):
@@ -100,7 +101,7 @@ class PhaseAverage(Saved):
     nodes: int = 32
 
     def kernels(self, name: str = NAMESPACE) -> tuple[Kernel, ...]:
-        """terms, near_identity, mean_rate and actual_rate, for lc.build and lc.generate.
+        """terms, near_identity, mean_rate, actual_rate and slow_field, for lc.build and lc.generate.
 
         Args:
             name: C identifier that begins every symbol.
@@ -113,6 +114,10 @@ class PhaseAverage(Saved):
     def library(self) -> Library:
         """The compiled kernels."""
         return _library(self.kernels())
+
+    def slow_field(self) -> Kernel:
+        """(x, eps, order) -> x' of the averaged system, which the phase does not enter, for lc.floquet."""
+        return next(each for each in self.kernels() if each.name == "slow_field")
 
     def terms(self, x: ArrayLike) -> SlowTerms:
         """(F1, F2) at x (..., n)."""
@@ -229,8 +234,9 @@ def phase_average(
         raise InputError(f"phase_average: {len(terms)} formulas for the variables {', '.join(names)}")
     field_of, _ = _system(terms, G, rate, names, phase, values)
     length = _length(period)
-    count = _enough_nodes(field_of, len(names), length) if nodes is None else nodes
-    return PhaseAverage(terms, G, rate, names, phase, period, order, values, count)
+    if nodes is None:  # twice the phases at which F and G are resolved: products of two of them then are
+        nodes = 2 * highest_harmonic(field_of, len(names), (), length, _NODES, "phase_average")[1]
+    return PhaseAverage(terms, G, rate, names, phase, period, order, values, nodes)
 
 
 @kernel_factory()
@@ -270,35 +276,6 @@ def _length(period: Any) -> float:
     if not (np.isfinite(value) and value > 0):
         raise PeriodError(f"phase_average: the period {period!r} is not positive")
     return value
-
-
-def _enough_nodes(field_of: FieldBody, n: int, length: float) -> int:
-    """Twice the nodes at which F and G are resolved at some points: products of two of them then are."""
-    from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
-
-    rng = np.random.default_rng(0)
-    points = rng.uniform(0.2, 0.8, (n, 6))
-
-    def samples(phases: Array) -> Array:
-        values = field_of(NumpyArithmetic(), [p[:, None] for p in points], [phases])
-        rows = np.stack([np.broadcast_to(np.asarray(v, dtype=float), (6, len(phases))) for v in values])
-        return rows[:, np.all(np.isfinite(rows), axis=(0, 2))]
-
-    with np.errstate(all="ignore"):
-        ends = samples(np.array([0.1, 0.37, 0.73]) * length), samples((np.array([0.1, 0.37, 0.73]) + 1) * length)
-        if not np.allclose(*ends, rtol=1e-9, atol=1e-9):
-            raise PeriodError(f"phase_average: F or G has not the period {length:.9g} in the phase; give period=")
-        count = _NODES
-        while True:
-            left = tail(samples(np.arange(count) / count * length))
-            if left < 1e-14 or (count == _MOST_NODES and left < _SMOOTH):
-                return min(2 * count, _MOST_NODES)
-            if count == _MOST_NODES:
-                raise AssumptionError(
-                    f"phase_average: the Fourier coefficients of F or G do not decay (the last quarter of {count} is {left:.1e} "
-                    "of the largest): a jump or a corner in the phase, for which the second order does not hold"
-                )
-            count *= 2
 
 
 @lru_cache(maxsize=64)

@@ -128,6 +128,26 @@ def _third_along_first(p: Program) -> str:
     return p.primitive(p.sum(*moved))[0]
 
 
+def differentiated(order: int) -> tuple[Program, dict[str, str]]:
+    """`program(order)` with the derivative of each of its arrays along a constant "v", and their names by the names of the arrays.
+
+    The steps are multilinear, linear, or P and the mean: each is differentiated by its own rule, the point moving along v.
+    """
+    p, rates = program(order), dict[str, str]()
+    for step in list(p.steps):
+        if step.kind == "field":
+            directions = [str(each) for each in step.terms]
+            moved = [(1, p.field(*directions, "v"))]
+            for i, each in enumerate(directions):
+                moved.append((1, p.field(*directions[:i], rates[each], *directions[i + 1 :])))
+            rates[step.output] = p.sum(*moved)
+        elif step.kind == "sum":
+            rates[step.output] = p.sum(*((factor, rates[array]) for factor, array in step.terms))
+        else:
+            rates[step.output], rates[step.mean] = p.primitive(rates[str(step.terms[0])])
+    return p, rates
+
+
 def indexed(names: Sequence[object], means: Sequence[str]) -> list[str]:
     """C expressions of directions at node j, each with its component along eps."""
     return [f"{each}{'' if each in means else '[j]'}, {1.0 if each == 'u1' else 0.0}" for each in names]

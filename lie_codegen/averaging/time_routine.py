@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,11 +9,11 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.phase_routine import Frozen, no_tangent, primitive
-from lie_codegen.averaging.time_program import Program, indexed, program
+from lie_codegen.averaging.time_program import Program, Step, differentiated, indexed, program
 from lie_codegen.averaging.vector_field import FieldBody, along
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.routine import Routine, call_routine
+from lie_codegen.kernel.routine import Routine, Tangent, call_routine
 
 
 def time_routine(
@@ -32,48 +31,80 @@ def time_routine(
         nodes: number of times.
         key: a text that all this follows from.
     """
-    z, t = Port("z", (size,)), Port("t", ())
+    plain = program(order)
+    results = [f"F{q}[i]" for q in range(1, order + 1)] + [f"u{q}[0][i]" for q in range(1, order)]
+    moving, rates = differentiated(order)
+    sources = {each.output: str(each.terms[0]) for each in plain.steps if each.kind == "primitive"}
+    # du_q/dt = H_q - F_q, H_q being what u_q is the primitive of
+    moved = [f"{rates[f'F{q}']}[i]" for q in range(1, order + 1)]
+    moved += [f"{rates[f'u{q}']}[0][i] + turn * ({sources[f'u{q}']}[0][i] - F{q}[i])" for q in range(1, order)]
 
-    def helper(count: int) -> Kernel:
-        letters = [("a", "a_eps"), ("b", "b_eps"), ("c", "c_eps")][:count]
-        ports = tuple(port for v, e in letters for port in (Port(v, (size,)), Port(e, ())))
+    def made(name: str, steps: Program, results: list[str], inputs: int, tangent: Tangent, direction: bool) -> Routine:
+        most = max(len(each.terms) for each in steps.steps if each.kind == "field")
+        helpers = tuple(_derivative(name, namespace, field, size, count) for count in range(most + 1))
+        views = [_view(each, steps, [helper.symbol for helper in helpers]) for each in steps.steps]
+        lines = [f"{array}[M][N]" for array in steps.arrays] + [f"{mean}[N]" for mean in steps.means]
+        settings = (
+            ("key", key), ("size", size), ("order", order), ("nodes", nodes), ("period", repr(period)), ("direction", direction),
+            ("primitive", Frozen([repr(float(p)) for p in primitive(nodes)])), ("arrays", Frozen(lines)),
+            ("steps", Frozen(views)), ("results", Frozen(results)),
+        )  # fmt: skip
 
-        def body(ops: Arithmetic, z: Any, t: Any, *given: Any) -> tuple[Any, ...]:
-            directions = [[*given[2 * i], given[2 * i + 1]] for i in range(count)]
-            return (along(field, ops, [*z, ops.constant(0)], [t], *directions),)
+        def twin(values: Sequence[float]) -> Array:
+            given = np.asarray(values, dtype=float)
+            known = run_program(steps, field, given, size, period, nodes)
+            if not direction:
+                return np.concatenate(
+                    [known[each] for each in _names(order)[0]] + [known[each][0] for each in _names(order)[1]]
+                )
+            slow = [known[rates[each]] for each in _names(order)[0]]
+            turn, fast = given[2 * size + 1], []
+            for q in range(1, order):
+                fast.append(known[rates[f"u{q}"]][0] + turn * (known[sources[f"u{q}"]][0] - known[f"F{q}"]))
+            return np.concatenate([*slow, *fast])
 
-        return Kernel(f"{name}_d{count}", namespace, (z, t, *ports), (Port("f", (size,)),), body)
+        outputs = (2 * order - 1) * size
+        return Routine(name, inputs, outputs, "time_average.c.jinja", settings, helpers, twin, tangent)
 
-    steps = program(order)
-    helpers = tuple(helper(count) for count in range(min(order, 4)))
-    views = []
-    for each in steps.steps:
-        view: dict[str, Any] = {"kind": each.kind, "output": each.output, "mean": each.mean}
-        if each.kind == "field":
-            view |= {"helper": helpers[len(each.terms)].symbol, "inputs": indexed(each.terms, steps.means)}
-        elif each.kind == "sum":
-            view["expression"] = " + ".join(f"({factor!r}) * {array}[j][i]" for factor, array in each.terms)
-        else:
-            view["inputs"] = each.terms[0]
-        views.append(view)
-    lines = [f"{array}[M][N]" for array in steps.arrays] + [f"{mean}[N]" for mean in steps.means]
-    settings = (
-        ("key", key), ("size", size), ("order", order), ("nodes", nodes), ("period", repr(period)),
-        ("primitive", Frozen([repr(float(p)) for p in primitive(nodes)])), ("arrays", Frozen(lines)),
-        ("steps", Frozen(views)),
-    )  # fmt: skip
+    rate = made(f"{name}_tangent", moving, moved, 2 * size + 2, no_tangent, True)
 
-    def twin(values: Sequence[float]) -> Array:
-        return run_program(steps, field, np.asarray(values[:size]), float(values[size]), period, order, nodes)
+    def tangent(ops: Any, inputs: Sequence[Scalar], outputs: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
+        return call_routine(ops, rate, [*inputs, *(ops.constant(0) + each for each in rates)])
 
-    return Routine(name, size + 1, (2 * order - 1) * size, "time_average.c.jinja", settings, helpers, twin, no_tangent)
+    return made(name, plain, results, size + 1, tangent, False)
 
 
-def run_program(steps: Program, field: FieldBody, z: Array, t: float, period: float, order: int, nodes: int) -> Array:
-    """The same by Python."""
-    ops, n = FloatArithmetic(), len(z)
+def _names(order: int) -> tuple[list[str], list[str]]:
+    return [f"F{q}" for q in range(1, order + 1)], [f"u{q}" for q in range(1, order)]
+
+
+def _derivative(name: str, namespace: str, field: FieldBody, size: int, count: int) -> Kernel:
+    """D^count f at (z, t) along directions, each with its component along eps."""
+    ports = tuple(port for v in "abcd"[:count] for port in (Port(v, (size,)), Port(f"{v}_eps", ())))
+
+    def body(ops: Arithmetic, z: Any, t: Any, *given: Any) -> tuple[Any, ...]:
+        directions = [[*given[2 * i], given[2 * i + 1]] for i in range(count)]
+        return (along(field, ops, [*z, ops.constant(0)], [t], *directions),)
+
+    inputs = (Port("z", (size,)), Port("t", ()), *ports)
+    return Kernel(f"{name}_d{count}", namespace, inputs, (Port("f", (size,)),), body)
+
+
+def _view(step: Step, steps: Program, symbols: Sequence[str]) -> dict[str, Any]:
+    """A step as the template reads it."""
+    view: dict[str, Any] = {"kind": step.kind, "output": step.output, "mean": step.mean}
+    if step.kind == "field":
+        return view | {"helper": symbols[len(step.terms)], "inputs": indexed(step.terms, [*steps.means, "v"])}
+    if step.kind == "sum":
+        return view | {"expression": " + ".join(f"({factor!r}) * {array}[j][i]" for factor, array in step.terms)}
+    return view | {"inputs": step.terms[0]}
+
+
+def run_program(steps: Program, field: FieldBody, values: Array, n: int, period: float, nodes: int) -> dict[str, Array]:
+    """The arrays and the means by Python; `values` are z, t and, of a derivative, the direction of z."""
+    ops, z, t = FloatArithmetic(), values[:n], float(values[n])
     shift = period * primitive(nodes)[(np.arange(nodes)[:, None] - np.arange(nodes)) % nodes]
-    found: dict[str, Array] = {}
+    found: dict[str, Array] = {"v": values[n + 1 : 2 * n + 1]}
     for each in steps.steps:
         if each.kind == "field":
             rows = []
@@ -90,47 +121,4 @@ def run_program(steps: Program, field: FieldBody, z: Array, t: float, period: fl
         else:
             array = found[str(each.terms[0])]
             found[each.output], found[each.mean] = shift @ array, array.mean(axis=0)
-    slow = [found[f"F{q}"] for q in range(1, order + 1)]
-    return np.concatenate([*slow, *(found[f"u{q}"][0] for q in range(1, order))])
-
-
-def time_kernels(
-    routine: Routine, field: FieldBody, size: int, order: int, period: float, namespace: str
-) -> tuple[Kernel, ...]:
-    """terms(z) -> F (order, n), near_identity(z, t) -> u (order - 1, n) for order > 1, mean_rate(z, eps), actual_rate(y, t, eps)."""
-    n = size
-    z, y, t, eps = Port("z", (n,)), Port("y", (n,)), Port("t", ()), Port("eps", ())
-
-    def rows(values: Sequence[Scalar], first: int, count: int) -> list[list[Scalar]]:
-        return [list(values[(first + q) * n : (first + q + 1) * n]) for q in range(count)]
-
-    def terms(ops: Arithmetic, z: Any) -> tuple[Any, ...]:
-        return (rows(call_routine(ops, routine, [*z, ops.constant(0)]), 0, order),)
-
-    def near_identity(ops: Arithmetic, z: Any, t: Any) -> tuple[Any, ...]:
-        return (rows(call_routine(ops, routine, [*z, t]), order, order - 1),)
-
-    def mean_rate(ops: Arithmetic, z: Any, eps: Any) -> tuple[Any, ...]:
-        total: list[Scalar] = [0] * n
-        for row in reversed(rows(call_routine(ops, routine, [*z, ops.constant(0)]), 0, order)):
-            total = [eps * (a + b) for a, b in zip(row, total, strict=True)]
-        return (total,)
-
-    def actual_rate(ops: Arithmetic, y: Any, t: Any, eps: Any) -> tuple[Any, ...]:
-        return ([eps * each for each in field(ops, [*y, eps], [t])],)
-
-    def draw(rng: random.Random) -> list[float]:
-        return [rng.uniform(0.2, 0.8) for _ in range(n)]
-
-    kernels = [
-        Kernel("terms", namespace, (z,), (Port("F", (order, n)),), terms, "z' = sum eps^q F_q(z), zero-mean gauge", "", lambda rng: (draw(rng),)),
-        Kernel("mean_rate", namespace, (z, eps), (Port("z_dot", (n,)),), mean_rate, "z' = sum eps^q F_q(z)", "", lambda rng: (draw(rng), 0.05)),
-        Kernel("actual_rate", namespace, (y, t, eps), (Port("y_dot", (n,)),), actual_rate, "y' = eps f(y, t; eps)", "",
-               lambda rng: (draw(rng), rng.uniform(0, period), 0.05)),
-    ]  # fmt: skip
-    if order > 1:
-        kernels.insert(1, Kernel(
-            "near_identity", namespace, (z, t), (Port("u", (order - 1, n)),), near_identity,
-            "y = z + sum eps^q u_q(z, t), each of zero mean in t", "", lambda rng: (draw(rng), rng.uniform(0, period)),
-        ))  # fmt: skip
-    return tuple(kernels)
+    return found

@@ -11,23 +11,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.averaging.harmonics import highest_harmonic, is_trigonometric
 from lie_codegen.averaging.near_identity import GOOD, to_mean
-from lie_codegen.averaging.phase_routine import tail
-from lie_codegen.averaging.time_routine import time_kernels, time_routine
+from lie_codegen.averaging.time_kernels import time_kernels
+from lie_codegen.averaging.time_routine import time_routine
 from lie_codegen.averaging.vector_field import FieldBody, formula_field, read_formulas
-from lie_codegen.errors import AssumptionError, InputError, PeriodError, ShapeError
+from lie_codegen.errors import InputError, PeriodError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.definition import definition_of, kernel_factory
 from lie_codegen.kernel.kernel import Kernel
-from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import REACHED, Field, integrate
 
 NAMESPACE = "time_average"
-_MOST_ORDER, _MOST_NODES, _SAMPLES = 4, 256, 64
+_MOST_ORDER, _SAMPLES = 4, 64
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,6 +82,10 @@ class TimeAverage(Saved):
     def library(self) -> Library:
         """The compiled kernels."""
         return _library(self.kernels())
+
+    def slow_field(self) -> Kernel:
+        """(z, eps) -> z' of the averaged system, for lc.floquet."""
+        return next(each for each in self.kernels() if each.name == "mean_rate")
 
     def terms(self, y: ArrayLike) -> tuple[Array, ...]:
         """(F_1, .., F_order) at y (..., n), each (..., n)."""
@@ -183,7 +188,7 @@ def time_average(
     names, values, terms = tuple(variables), dict(parameters or {}), tuple(rates)
     if len(terms) != len(names):
         raise InputError(f"time_average: {len(terms)} formulas for the variables {', '.join(names)}")
-    needed, exact = _enough_nodes(_field(terms, names, values), len(names), _length(period), order)
+    needed, exact = _enough_nodes(terms, names, values, _length(period), order)
     return TimeAverage(terms, names, period, order, values, needed if nodes is None else nodes, exact)
 
 
@@ -202,8 +207,11 @@ def formula_time_kernels(
 
 
 def _field(rates: Sequence[Any], variables: Sequence[str], numbers: Mapping[str, Any] | None) -> FieldBody:
-    read = read_formulas(rates, [*variables, "eps"], ("t",), numbers, "time_average")
-    return formula_field(read, [*variables, "eps"], ("t",))
+    return formula_field(_read(rates, variables, numbers), [*variables, "eps"], ("t",))
+
+
+def _read(rates: Sequence[Any], variables: Sequence[str], numbers: Mapping[str, Any] | None) -> tuple[sp.Expr, ...]:
+    return read_formulas(rates, [*variables, "eps"], ("t",), numbers, "time_average")
 
 
 def _length(period: Any) -> float:
@@ -213,38 +221,17 @@ def _length(period: Any) -> float:
     return value
 
 
-def _enough_nodes(field_of: FieldBody, n: int, length: float, order: int) -> tuple[int, bool]:
+def _enough_nodes(
+    rates: Sequence[Any], variables: Sequence[str], numbers: Mapping[str, Any], length: float, order: int
+) -> tuple[int, bool]:
     """(nodes, exact): F_q needs more than q times the highest harmonic of f, u_q more than 2 (q - 1) times it."""
-    points = np.random.default_rng(0).uniform(0.2, 0.8, (n, 6))
-
-    def samples(times: Array) -> Array:
-        values = field_of(NumpyArithmetic(), [*(p[:, None] for p in points), 0.1], [times])
-        rows = np.stack([np.broadcast_to(np.asarray(v, dtype=float), (6, len(times))) for v in values])
-        return rows[:, np.all(np.isfinite(rows), axis=(0, 2))]
-
-    with np.errstate(all="ignore"):
-        moments = np.array([0.1, 0.37, 0.73]) * length
-        if not np.allclose(samples(moments), samples(moments + length), rtol=1e-9, atol=1e-9):
-            raise PeriodError(f"time_average: f has not the period {length:.9g} in t; give period=")
-        found = samples(np.arange(_SAMPLES) / _SAMPLES * length)
-        waves = np.abs(np.fft.rfft(found, axis=-1)).max(axis=(0, 1))
-        present = np.flatnonzero(waves > 1e-13 * max(float(waves.max()), 1e-300))
-        highest = int(present[-1]) if len(present) else 0
-        if highest <= _SAMPLES // 4:
-            needed = max(2 * (order - 1), order) * max(highest, 1) + 2
-            return min(needed + needed % 2, _MOST_NODES), True
-        count = 2 * _SAMPLES
-        while tail(samples(np.arange(count) / count * length)) > 1e-14:
-            if count == _MOST_NODES:
-                left = tail(samples(np.arange(count) / count * length))
-                if left < 1e-9:
-                    break
-                raise AssumptionError(
-                    f"time_average: the Fourier coefficients of f do not decay (the last quarter of {count} is {left:.1e} of the "
-                    "largest): a jump or a corner in t, for which the second order does not hold"
-                )
-            count *= 2
-        return min(2 * count, _MOST_NODES), False
+    read, t = _read(rates, variables, numbers), sp.Symbol("t", real=True)
+    field_of = formula_field(read, [*variables, "eps"], ("t",))
+    highest, _ = highest_harmonic(field_of, len(variables), (0.1,), length, _SAMPLES, "time_average")
+    exact = all(is_trigonometric(each, t) for each in read)
+    # derivatives in y of what is no polynomial have more harmonics above rounding than f has
+    needed = (1 if exact else 2) * max(2 * (order - 1), order) * max(highest, 1) + 2
+    return needed + needed % 2, exact
 
 
 @lru_cache(maxsize=64)

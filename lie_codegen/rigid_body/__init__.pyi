@@ -4,6 +4,7 @@ from .coning import coning_angles as coning_angles
 from .coning import coning_bounds as coning_bounds
 from .coning import modulus_squared as modulus_squared
 from .elliptic_kernels import elliptic_kernels as elliptic_kernels
+from .environment_torques import torque as torque
 from .euler_average import euler_average as euler_average
 from .euler_equilibria import limit_cycle_gains as limit_cycle_gains
 from .euler_equilibria import limit_cycles as limit_cycles
@@ -17,7 +18,6 @@ from .euler_variational import moving_parts as moving_parts
 from .free_rigid_body import free_rigid_body as free_rigid_body
 from .free_rotation import free_rotation as free_rotation
 from .mass_points import inertia_from_masses as inertia_from_masses
+from .plates import plates as plates
 from .principal_body import principal_body as principal_body
-from .torques import plates as plates
-from .torques import torque as torque
 from .tumbling_average import tumbling_average as tumbling_average

@@ -12,17 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.near_identity import GOOD, to_mean
+from lie_codegen.averaging.near_identity import to_mean
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.build import build
-from lie_codegen.kernel.elliptic import LARGEST_MODULUS, nome
+from lie_codegen.kernel.elliptic import nome
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body import euler_kernels
+from lie_codegen.rigid_body.euler_motion import averaged_motion
 from lie_codegen.rigid_body.euler_second_order import (
-    MARGIN,
     EulerSolution,
-    MeanMotion,
     NearIdentity,
     SecondOrder,
     inside,
@@ -30,10 +29,9 @@ from lie_codegen.rigid_body.euler_second_order import (
 )
 from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_perturbation
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, SlowState, check_slow
-from lie_codegen.rigid_body.phase_as_time import cycle_growth, phase_time_kernels, third_order_motion
+from lie_codegen.rigid_body.phase_as_time import cycle_growth, phase_time_kernels
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
 
 NAMESPACE = "euler_average"
 _MOST_NODES = 8192
@@ -106,6 +104,10 @@ class EulerAverage(Saved):
         """Compiled: terms, near_identity, mean_rate and actual_rate of (Omega, k, s) with the phase as time, to order 3."""
         return build(phase_time_kernels(self.perturbation, NAMESPACE))
 
+    def slow_field(self) -> Kernel:
+        """(x, eps, order) -> x' of the averaged (Omega, k), or (Omega, k, tau), which the phase does not enter, for lc.floquet."""
+        return next(each for each in second_order_kernels(self.perturbation, NAMESPACE) if each.name == "slow_field")
+
     def cycle_growth(self, k: float) -> tuple[float, float]:
         """(c3, dk) of a limit cycle k of linear g: Omega' = c3 eps^3 / Omega [rad/s], the cycle moving by dk eps^2 / Omega^2.
 
@@ -120,7 +122,7 @@ class EulerAverage(Saved):
             InputError: as `variational`.
         """
         self._check(Omega, k)
-        _, F2, _, _, G2 = broadcast_call(self.second_order_library["terms"], self._stacked(Omega, k, tau))
+        _, F2, _, _, G2 = broadcast_call(self.second_order_library["terms"], self.stacked(Omega, k, tau))
         return SecondOrder(F2[..., 0][()], F2[..., 1][()], G2)
 
     def near_identity(self, Omega: ArrayLike, k: ArrayLike, phi: ArrayLike, tau: ArrayLike = 0.0) -> NearIdentity:
@@ -130,7 +132,7 @@ class EulerAverage(Saved):
             InputError: as `variational`.
         """
         self._check(Omega, k)
-        W, V = broadcast_call(self.second_order_library["near_identity"], self._stacked(Omega, k, tau), phi)
+        W, V = broadcast_call(self.second_order_library["near_identity"], self.stacked(Omega, k, tau), phi)
         return NearIdentity(W[..., 0][()], W[..., 1][()], V)
 
     def to_mean(self, Omega: float, k: float, phi: float, eps: float, tau: float = 0.0) -> SlowState:
@@ -140,7 +142,7 @@ class EulerAverage(Saved):
             InputError: as `variational`.
         """
         self._check(Omega, k)
-        return self._to_mean(Omega, k, phi, eps, tau)[0]
+        return self.mean_point(Omega, k, phi, eps, tau)[0]
 
     def to_osculating(
         self, Omega: ArrayLike, k: ArrayLike, phi: ArrayLike, eps: float, tau: ArrayLike = 0.0
@@ -150,18 +152,20 @@ class EulerAverage(Saved):
         values = zip((Omega, k, phi), W, strict=True)
         return SlowState(*(np.asarray(mean, dtype=float) + eps * w for mean, w in values))
 
-    def _stacked(self, *columns: ArrayLike) -> Array:
+    def stacked(self, *columns: ArrayLike) -> Array:
+        """(..., 2 or 3) slow variables (Omega, k, tau) as one array, tau only where g depends on it."""
         kept = columns[:2] if self.perturbation.is_autonomous else columns
         return np.stack(np.broadcast_arrays(*(np.asarray(each, dtype=float) for each in kept)), axis=-1)
 
-    def _to_mean(self, Omega: float, k: float, phi: float, eps: float, tau: float) -> tuple[SlowState, str]:
+    def mean_point(self, Omega: float, k: float, phi: float, eps: float, tau: float) -> tuple[SlowState, str]:
+        """Mean (Omega, k, phi) of osculating ones, and the status of the map."""
         function = self.second_order_library["near_identity"]
 
         def maps(y: Array, psi: float) -> tuple[Array, Any]:
             W, V = function(y, psi)
             return np.asarray(W), V
 
-        y, psi, status = to_mean(maps, inside(self._stacked(Omega, k, tau)), float(phi), eps, inside)
+        y, psi, status = to_mean(maps, inside(self.stacked(Omega, k, tau)), float(phi), eps, inside)
         return SlowState(y[0], y[1], np.asarray(psi)[()]), status
 
     def solve(
@@ -195,47 +199,10 @@ class EulerAverage(Saved):
 
     def _solve(self, omega0: Array, t: Array, eps: float, order: int, start: str, rtol: float) -> EulerSolution:
         body = self.body.adapted_to(omega0)
-        if body != self.body:
-            other = EulerAverage(body, EulerPerturbation(body.model, self.perturbation.terms), self.tolerance)
-            return other._solve(omega0, t, eps, order, start, rtol)
-        if np.any(np.diff(t) <= 0) or not np.all(np.isfinite(t)):
-            raise InputError("t: finite, increasing times; the first is the start")
-        if len(t) == 1:
-            t = np.array([0.0, t[0]])
-        first, tau = body.to_slow(omega0, eps * t[0]), eps * float(t[0])
-        if order == 3:
-            return self._third(body, first, tau, t, eps, rtol)
-        mean, status = first, GOOD
-        if start == "mean":
-            mean, status = self._to_mean(float(first.Omega), float(first.k), float(first.phi), eps, tau)
-        state = np.append(self._stacked(mean.Omega, mean.k, tau), mean.phi)
-        rate = Field(
-            self.second_order_library["mean_rate"], len(state), time=None, constants={"eps": eps, "order": order}
-        )
-        ends = Field(lambda _, y: np.array([MARGIN - y[1], y[0] - 1e-9 * first.Omega]), len(state))
-        motion = integrate(rate, state, t[0], t[-1], rtol=rtol, atol=1e-13, events=ends, directions=[-1, -1])
-        if motion.status == EVENT:
-            status = ("separatrix", "the spin dies out")[motion.event]
-        elif motion.status != REACHED:
-            status = f"the averaged system has no solution beyond t = {motion.t[-1]:.9g}"
-        kept = t[t <= motion.t[-1]]
-        y = motion.at(kept)
-        means = MeanMotion(y[:, 0], y[:, 1], y[:, -1])
-        found = self.to_osculating(means.Omega, means.k, means.phi, eps, eps * kept)
-        omega = body.from_slow(found.Omega, np.clip(found.k, 0, LARGEST_MODULUS), found.phi, eps * kept)
-        return EulerSolution(kept, *found, omega, means, status, float(motion.t[-1]), order)
-
-    def _third(
-        self, body: FreeRigidBody, first: SlowState, tau: float, t: Array, eps: float, rtol: float
-    ) -> EulerSolution:
-        x0 = np.array([float(first.Omega), float(first.k), tau])
-        rate = float(body.frequency(first.Omega, first.k, tau))
-        kept, mean, full, status, end = third_order_motion(
-            self.third_order_library, x0, float(first.phi), rate, t, eps, rtol
-        )
-        omega = body.from_slow(full[:, 0], full[:, 1], full[:, 3], eps * kept)
-        means = MeanMotion(mean[:, 0], mean[:, 1], mean[:, 3])
-        return EulerSolution(kept, full[:, 0], full[:, 1], full[:, 3], omega, means, status, end, 3)
+        if body == self.body:
+            return averaged_motion(self, omega0, t, eps, order, start, rtol)
+        other = EulerAverage(body, EulerPerturbation(body.model, self.perturbation.terms), self.tolerance)
+        return averaged_motion(other, omega0, t, eps, order, start, rtol)
 
     @property
     def is_closed(self) -> bool:

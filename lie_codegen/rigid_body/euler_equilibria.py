@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.averaging.orbit_kernels import kernel_orbit_kernels
 from lie_codegen.errors import InputError
+from lie_codegen.groups.build import build
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS, jacobi, ladder
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.mechanics.relative_equilibria import NewtonMethod
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU
 
@@ -60,10 +63,10 @@ def limit_cycles(
         for left, right, a, b in zip(grid, grid[1:], values, values[1:], strict=False):
             if a * b < 0 or a == 0:
                 found.append(left if a == 0 else brentq(drift, left, right, xtol=1e-14, rtol=1e-14))
+    field = _slow_field(flow, tau)
     cycles = []
     for k in found:
-        step = 1e-5 * min(k, 1 - k)
-        slope = (drift(k + step) - drift(k - step)) / (2 * step)
+        slope = float(field.slope(np.array([Omega, k]))[1, 1])
         growth = float(flow.averaged(Omega, k, tau).F_Omega) / Omega
         cycles.append(LimitCycle(float(k), Omega, slope, growth))
     return tuple(cycles)
@@ -89,43 +92,56 @@ def slow_equilibria(
     *,
     k_range: tuple[float, float] = (1e-3, 0.999),
     tau: float = 0.0,
+    eps: float | None = None,
 ) -> tuple[SlowEquilibrium, ...]:
     """Isolated equilibria of the averaged flow in a box: Newton from a 24 x 24 grid, near-duplicates dropped.
+
+    Derivatives are exact. `lc.floquet(flow, guess=, parameters={"eps": ...})` finds its limit cycles in (Omega, k).
+
+    Args:
+        flow: of lc.euler_average.
+        Omega_range, k_range: the box.
+        tau: slow time at which a g that depends on it is held.
+        eps: equilibria of F1 + eps F2, the second order; of F1 if None.
 
     Raises:
         InputError: the flow is degenerate there, as for homogeneous g: use `limit_cycles`.
     """
-    from scipy.optimize import root
-
-    def field(x: Array) -> Array:
-        k = float(np.clip(x[1], 1e-9, LARGEST_MODULUS))
-        values = flow.averaged(max(float(x[0]), 1e-9), k, tau)
-        return np.array([values.F_Omega, values.F_k], dtype=np.float64)
-
-    def jacobian(x: Array) -> Array:
-        steps = np.array([1e-6 * x[0], 1e-6 * min(x[1], 1 - x[1])])
-        columns = [(field(x + s) - field(x - s)) / (2 * s[i]) for i, s in enumerate(np.diag(steps))]
-        return np.column_stack(columns)
-
+    run = _slow_field(flow, tau, eps)
     spins, moduli = np.meshgrid(np.linspace(*Omega_range, 24), np.linspace(*k_range, 24), indexing="ij")
     values = np.stack(flow.averaged(spins, moduli, tau)[:2])
+    if eps is not None:
+        values = values + eps * np.stack(flow.second_order(spins, moduli, tau)[:2])
     change = np.logical_and.reduce([_changes_sign(component) for component in values])
     found: list[SlowEquilibrium] = []
     for i, j in zip(*np.nonzero(change), strict=True):
-        start = np.array([spins[i : i + 2, j].mean(), moduli[i, j : j + 2].mean()])
-        result = root(field, start, tol=1e-13)
-        x = result.x
-        inside = Omega_range[0] <= x[0] <= Omega_range[1] and k_range[0] <= x[1] <= k_range[1]
-        if not (inside and np.abs(field(x)).max() < 1e-10):
+        x = run.from_guess(np.array([spins[i : i + 2, j].mean(), moduli[i, j : j + 2].mean()]))
+        if x is None or not (Omega_range[0] <= x[0] <= Omega_range[1] and k_range[0] <= x[1] <= k_range[1]):
             continue
         if any(abs(e.Omega - x[0]) + abs(e.k - x[1]) < 1e-7 for e in found):
             continue
-        matrix = jacobian(x)
+        matrix = run.slope(x)
         if abs(np.linalg.det(matrix)) < 1e-9 * np.linalg.norm(matrix) ** 2:
             raise InputError("the slow flow has a line of equilibria (homogeneous g): use limit_cycles")
         first, second = (complex(v) for v in np.linalg.eigvals(matrix))
         found.append(SlowEquilibrium(float(x[0]), float(x[1]), (first, second)))
     return tuple(found)
+
+
+def _slow_field(flow: EulerAverage, tau: float, eps: float | None = None) -> NewtonMethod:
+    """(Omega', k') per unit eps of the averaged flow, to first order if eps is None, with its exact derivative."""
+    small, order = (1.0, 1) if eps is None else (eps, 2)
+    library = build(kernel_orbit_kernels(flow.slow_field(), {"eps": small, "order": order}))
+    slow = [] if flow.perturbation.is_autonomous else [tau]
+
+    def inside(x: Array) -> Array:
+        """NaN where there is no motion, which ends a search there."""
+        return np.array([*x, *slow] if x[0] > 0 and 0 < x[1] <= LARGEST_MODULUS else [np.nan, np.nan, *slow])
+
+    return NewtonMethod(
+        lambda x: np.asarray(library["rate"](inside(x), 0.0))[:2] / small,
+        lambda x: np.asarray(library["jacobian"](inside(x), 0.0))[:2, :2] / small,
+    )
 
 
 def _changes_sign(values: Array) -> Any:

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.phase_routine import Clock, Node, Nodes, phase_kernels, phase_routine
+from lie_codegen.averaging.phase_kernels import phase_kernels
+from lie_codegen.averaging.phase_routine import Clock, Node, Nodes, phase_routine
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS, jacobi, ladder

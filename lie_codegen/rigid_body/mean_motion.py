@@ -93,7 +93,7 @@ def modulus(axes: BodyAxes, y: Array) -> Array:
     D = y[:, 3]
     with np.errstate(invalid="ignore", divide="ignore"):
         k: Array = np.sqrt((I1 - I2) * I3 * D / ((I2 - I3) * (square * (I1 - I3) - I1 * D)))
-    return k
+    return k + 0.0  # no negative zero at pure spin
 
 
 def _piece(

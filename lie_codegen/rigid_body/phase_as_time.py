@@ -13,7 +13,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.near_identity import to_mean
-from lie_codegen.averaging.time_routine import time_kernels, time_routine
+from lie_codegen.averaging.time_kernels import time_kernels
+from lie_codegen.averaging.time_routine import time_routine
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS

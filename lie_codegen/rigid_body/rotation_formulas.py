@@ -79,6 +79,11 @@ def apply(A: Sequence[Vector], v: Vector) -> list[Scalar]:
     return [row[0] * v[0] + row[1] * v[1] + row[2] * v[2] for row in A]
 
 
+def cross(a: Vector, b: Vector) -> list[Scalar]:
+    """a x b."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
 def shape_at(ops: Arithmetic, inertia: Vector, L: Scalar, first: Scalar, third: Scalar) -> Shape:
     """The shape of the motion with r1^2 = first, r3^2 = third, first + third = 1."""
     I1, I2, I3 = inertia

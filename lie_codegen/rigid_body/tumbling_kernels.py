@@ -13,9 +13,9 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import doubles, kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import call_routine
-from lie_codegen.rigid_body.rotation_formulas import about_third, apply, multiply, transpose
+from lie_codegen.rigid_body.rotation_formulas import about_third, apply, cross, multiply, transpose
 from lie_codegen.rigid_body.rotation_kernels import TERMS, precession_routine
-from lie_codegen.rigid_body.torques import Torque, cross
+from lie_codegen.rigid_body.torques import Torque
 from lie_codegen.rigid_body.tumbling_routines import (
     BODY,
     TorqueModel,

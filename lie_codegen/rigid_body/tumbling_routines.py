@@ -13,6 +13,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.elliptic import DEPTH, ladder, sn_cn_dn
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import Routine
+from lie_codegen.rigid_body.plates import plate_force
 from lie_codegen.rigid_body.rotation_formulas import (
     about_third,
     apply,
@@ -23,7 +24,7 @@ from lie_codegen.rigid_body.rotation_formulas import (
     transpose,
 )
 from lie_codegen.rigid_body.rotation_kernels import TERMS
-from lie_codegen.rigid_body.torques import Torque, plate_force
+from lie_codegen.rigid_body.torques import Torque
 from lie_codegen.rigid_body.torus_map import NODES as TORUS_NODES
 from lie_codegen.rigid_body.torus_map import SMALLEST_DIVISOR, torus_series
 

@@ -134,7 +134,22 @@ def test_the_package_in_c(tmp_path):
     text = (folder / "src" / "phase_average.c").read_text()
     assert text.count("sin(") < 30  # nodes are looped over
     subprocess.run(
-        ["cc", "-std=c99", "-Iinclude", "example.c", "src/phase_average.c", "-lm", "-o", "example"],
+        [
+            "cc",
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Wshadow",
+            "-Wconversion",
+            "-Werror",
+            "-Iinclude",
+            "example.c",
+            "src/phase_average.c",
+            "-lm",
+            "-o",
+            "example",
+        ],
         cwd=folder,
         check=True,
     )

@@ -119,7 +119,22 @@ def test_the_twin_and_the_package_in_c(tmp_path):
     folder = lc.generate(list(slow.kernels()), tmp_path / "out", name="time_average")
     assert len((folder / "src" / "time_average.c").read_text()) < 60_000  # nodes are looped over
     subprocess.run(
-        ["cc", "-std=c99", "-Iinclude", "example.c", "src/time_average.c", "-lm", "-o", "example"],
+        [
+            "cc",
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Wshadow",
+            "-Wconversion",
+            "-Werror",
+            "-Iinclude",
+            "example.c",
+            "src/time_average.c",
+            "-lm",
+            "-o",
+            "example",
+        ],
         cwd=folder,
         check=True,
     )

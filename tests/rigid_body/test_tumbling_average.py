@@ -269,10 +269,29 @@ def test_the_package_in_c(tmp_path):
     torques = [
         lc.torque.solar_pressure(debris(), ["cos(t)", "0", "sin(t)"], 1e-3),
         lc.torque.eddy_current(TENSOR, FIELD),
+        lc.torque.formula(own_kernel(), {"m": DIPOLE, "c": 0.1}),
+        lc.torque.drag(debris(), lambda t: (1, t, 0), 0.1),
     ]
     folder = lc.generate(list(lc.tumbling_average(BODY, torques).kernels()), tmp_path / "out", name="tumbling")
     subprocess.run(
-        ["cc", "-std=c99", "-Iinclude", "example.c", "src/tumbling.c", "-lm", "-o", "example"], cwd=folder, check=True
+        [
+            "cc",
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Wshadow",
+            "-Wconversion",
+            "-Werror",
+            "-Iinclude",
+            "example.c",
+            "src/tumbling.c",
+            "-lm",
+            "-o",
+            "example",
+        ],
+        cwd=folder,
+        check=True,
     )
     subprocess.run(["./example"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
