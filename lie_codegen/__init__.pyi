@@ -172,6 +172,7 @@ from .mechanics import vibrational_kernels as vibrational_kernels
 from .pictures import plot_loops as plot_loops
 from .pictures import plot_plan as plot_plan
 from .pictures import view as view
+from .pictures import widget as widget
 
 # rigid_body
 from .rigid_body import coning_angles as coning_angles

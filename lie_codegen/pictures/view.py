@@ -62,6 +62,26 @@ def view(
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"view: the page's name ends in .html, given {target}")
+    page = page_text(what, group=group, body=body, obstacles=obstacles, title=title, samples=samples, solve=solve)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise write_refusal(f"{target}: cannot be written", error) from None
+    return target
+
+
+def page_text(
+    what: Any,
+    *,
+    group: GroupLike | None = None,
+    body: str | Path | None = None,
+    obstacles: Sequence[Obstacle] = (),
+    title: str | None = None,
+    samples: int = _SAMPLES,
+    solve: bool = False,
+) -> str:
+    """The whole page as HTML; arguments and errors are those of `view`."""
     if isinstance(samples, bool) or not isinstance(samples, int) or not 2 <= samples <= _MOST:
         raise InputError(f"view: samples lies between 2 and {_MOST}, given {samples!r}")
     scene = _scene(what, None if group is None else as_group(group, "view"), samples)
@@ -90,18 +110,12 @@ def view(
     data = scene_data(shown, None if faces is not None else (None if body is None else str(body)), faces)
     # "</" would end the script element, whatever it stands in
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-    page = (
+    return (
         _part("page.html")
         .replace("@TITLE@", html.escape(shown.title))
         .replace("/*@SOLVER@*/", script)
         .replace("@DATA@", text)
     )
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise write_refusal(f"{target}: cannot be written", error) from None
-    return target
 
 
 def _part(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from tools import front_door
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+sys.path.insert(0, str(DOCS))  # as conf.py does
 _place = spec_from_file_location("site_pages", DOCS / "pages.py")
 assert _place is not None
 assert _place.loader is not None
@@ -56,8 +58,20 @@ def test_the_command_line_and_the_errors_are_there(reference: Path) -> None:
 
     text = (reference / "errors.md").read_text(encoding="utf-8")
     for name in vars(errors):
-        if name.endswith("Error"):
+        if name.endswith(("Error", "Warning")):
             assert f"`{name}`" in text
+
+
+def test_the_gallery_has_every_figure_its_command_and_numbers(reference: Path) -> None:
+    from lie_codegen.gallery.registry import TARGETS
+
+    text = (reference / "gallery.md").read_text(encoding="utf-8")
+    for target in TARGETS:
+        assert f"lie-codegen reproduce {target.name}\n" in text
+        assert (DOCS / "gallery" / f"{target.name}.webp").stat().st_size > 5_000
+        assert (DOCS / "gallery" / f"{target.name}-dark.webp").stat().st_size > 5_000
+    shown = {path.name.partition(".")[0].removesuffix("-dark") for path in (DOCS / "gallery").iterdir()}
+    assert shown == {target.name for target in TARGETS}
 
 
 @pytest.mark.parametrize(

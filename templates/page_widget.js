@@ -1,0 +1,25 @@
+// The widget of lc.widget: the page in a frame, its place in time shared with Python.
+function render({ model, el }) {
+  const frame = document.createElement("iframe");
+  frame.title = "A motion, its controls and errors over time";
+  frame.style.cssText = "width: 100%; border: 0; display: block;";
+  const tall = () => { frame.style.height = model.get("height") + "px"; };
+  const go = () => {
+    const view = frame.contentWindow && frame.contentWindow.lieView;
+    if (view && view.place !== model.get("place")) view.go(model.get("place"));
+  };
+  frame.addEventListener("load", () => {
+    const view = frame.contentWindow.lieView;
+    if (!view) return;
+    go();
+    view.heard = place => { if (place !== model.get("place")) { model.set("place", place); model.save_changes(); } };
+  });
+  const load = () => { frame.srcdoc = model.get("page"); };
+  model.on("change:page", load);
+  model.on("change:height", tall);
+  model.on("change:place", go);
+  tall(); load();
+  el.appendChild(frame);
+  return () => { model.off("change:page", load); model.off("change:height", tall); model.off("change:place", go); };
+}
+export default { render };
