@@ -11,6 +11,9 @@ import sys
 from functools import cached_property
 from pathlib import Path
 
+from cures import CURES
+from gallery import page as gallery_page
+
 PACKAGE = Path(__file__).resolve().parent.parent / "lie_codegen"
 
 
@@ -40,6 +43,7 @@ def write(folder: Path) -> None:
     for note in notes:
         _put(folder / "decisions" / note.name, plain(note.read_text(encoding="utf-8")))
     _put(folder / "decisions" / "index.md", _index("Decisions", [note.stem for note in notes]))
+    _put(folder / "gallery.md", gallery_page())
     for name in ("CHANGELOG", "CONTRIBUTING"):
         _put(folder / f"{name.lower()}.md", plain((PACKAGE.parent / f"{name}.md").read_text(encoding="utf-8")))
 
@@ -85,16 +89,17 @@ def errors() -> str:
         if inspect.isclass(value) and issubclass(value, Exception) and value.__module__ == module.__name__
     ]
     lines = [
-        "# Errors and warnings",
+        "# Errors and warnings, with their cures",
         "",
-        "An `InputError` says what was given wrongly (exit status 2), a `ComputationError` what failed (1).",
+        "An `InputError` says what was given wrongly (exit status 2), a `ComputationError` what failed (1). Every message says what, where and how",
+        "to mend it; the last column is what helps most often.",
         "",
-        "| name | is a | says |",
-        "|---|---|---|",
+        "| name | is a | says | cure |",
+        "|---|---|---|---|",
     ]
     for value in found:
         said = " ".join((inspect.getdoc(value) or "").split()).replace("|", "\\|")
-        lines.append(f"| `{value.__name__}` | `{value.__mro__[1].__name__}` | {said} |")
+        lines.append(f"| `{value.__name__}` | `{value.__mro__[1].__name__}` | {said} | {CURES[value.__name__]} |")
     return "\n".join(lines) + "\n"
 
 

@@ -83,12 +83,12 @@ def _draw(plan: Any, best: Any, t: Any, g: Any, mean: Any) -> Any:
         xlabel="$\\epsilon\\tilde u_1$ [rad]",
         ylabel="$\\epsilon\\tilde u_2$ [rad]",
     )
+    shown = [handle for axes in (top[0], middle[0]) for handle in axes.get_legend_handles_labels()[0]]
+    figure.legend(handles=shown, loc="outside lower center", ncols=4, frameon=False)
     caption(
         figure,
         "Target: Wei-Norman coordinates (0.1, 0.05, $\\pi$/40) in 24 s, four phases; grey: the same attitude by least energy.",
     )
-    shown = [handle for axes in (top[0], middle[0]) for handle in axes.get_legend_handles_labels()[0]]
-    figure.legend(handles=shown, loc="outside lower center", ncols=4, frameon=False)
     for axes in (*top, *middle, bottom[1]):
         axes.set_xlabel("t [s]")
     for axes in (*top, *middle, *bottom):

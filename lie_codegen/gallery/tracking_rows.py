@@ -68,11 +68,11 @@ def tracking_rows(folder: Path, progress: Callable[[str], None] = quiet) -> Gall
         f"$10^{{{np.log10(_FLOOR[each]):.0f}}}$ {unit}"
         for each, unit in (("W", "J"), ("distance", "m"), ("angle", "degrees"))
     )
+    figure.legend(*shown[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     caption(
         figure,
         f"Row of Table 1: its errors of position and of attitude. Logarithmic axes, cut at {cut}: below, rounding is seen.",
     )
-    figure.legend(*shown[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return save("tracking_rows", folder, figure, numbers)
 
 

@@ -50,8 +50,12 @@ def style() -> AbstractContextManager[None]:
 
 
 def caption(figure: Any, text: str) -> None:
-    """A sentence or two under the panels: what is seen, and what was left out."""
-    figure.supxlabel(text, fontsize=9, color="0.3", wrap=True)
+    """A sentence or two under the panels: what is seen, and what was left out. Over a legend that lies there, as its title."""
+    if figure.legends:
+        figure.legends[-1].set_title(text, prop={"size": 9})
+        figure.legends[-1].get_title().set_color("0.3")
+    else:
+        figure.supxlabel(text, fontsize=9, color="0.3", wrap=True)
 
 
 def symbol(label: str) -> str:

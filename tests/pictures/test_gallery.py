@@ -38,7 +38,8 @@ def examine(figure: Any) -> None:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     edge, renderer = figure.bbox, canvas.get_renderer()
-    titles = [text for text in (figure._suptitle, figure._supxlabel) if text is not None]
+    caption = figure.legends[-1].get_title() if figure.legends else figure._supxlabel
+    titles = [text for text in (figure._suptitle, caption) if text is not None and text.get_text()]
     assert len(titles) == 2, "a title and a caption"
     for text in titles:
         box = text.get_window_extent(renderer)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ def plan() -> lc.Plan:
 
 def test_without_anywidget_the_error_says_how_to_install(plan: lc.Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    widget_class = vars(sys.modules["lie_codegen.pictures.widget"])["_widget_class"]
+    widget_class = import_module("lie_codegen.pictures.widget")._widget_class
     widget_class.cache_clear()
     with pytest.raises(lc.errors.MissingDependencyError, match=r"lie_codegen\[widget\]"):
         lc.widget(plan)
@@ -66,7 +67,7 @@ def test_place_goes_both_ways_in_a_browser(plan: lc.Plan, tmp_path: Path, tab: A
     (tmp_path / "cell.html").write_text(page, encoding="utf-8")
     tab.goto((tmp_path / "cell.html").as_uri())
     inside = "document.querySelector('iframe').contentWindow.lieView"
-    tab.wait_for_function(f"document.querySelector('iframe').contentWindow.lieView?.heard !== undefined")
+    tab.wait_for_function("document.querySelector('iframe').contentWindow.lieView?.heard !== undefined")
     assert tab.evaluate(f"{inside}.place") == 20
     tab.evaluate("model.set('place', 33)")
     assert tab.evaluate(f"{inside}.place") == 33
