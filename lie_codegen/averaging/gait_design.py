@@ -18,6 +18,7 @@ from lie_codegen.averaging.gait_path import gait_of_fourier, gait_path
 from lie_codegen.averaging.path_end import product_of
 from lie_codegen.averaging.shape_connection import ShapeConnection
 from lie_codegen.errors import InputError
+from lie_codegen.exact.counts import count_between
 from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
@@ -75,7 +76,7 @@ def gait(
         steps: Magnus steps a period during the search; the result is computed to 1e-12 anew.
 
     Raises:
-        InputError: an unknown label, one shape only.
+        InputError: an unknown label, one shape only, harmonics outside 1 to 1000, steps outside 4 harmonics to 100,000.
     """
     group, k = connection.group, connection.size
     if k < 2:
@@ -84,13 +85,14 @@ def gait(
         )
     if maximise != "distance" and maximise not in group.labels:
         raise InputError(f'gait: maximise is "distance" or one of {", ".join(group.labels)}, got {maximise!r}')
-    if isinstance(harmonics, bool) or not isinstance(harmonics, int) or harmonics < 1:
-        raise InputError(f"gait: harmonics must be a positive integer, got {harmonics!r}")
+    harmonics = count_between(harmonics, 1, 1000, "gait: harmonics")
+    # a harmonic needs four steps of its own: with fewer the search climbs an error of the steps, which has no top
+    steps = count_between(steps, 4 * harmonics, 100_000, "gait: steps, at least four a harmonic,")
     if start is None:
         starts = [PeriodicInput(["cos(t)", f"{sign}*sin(t)", *["0"] * (k - 2)], period="2*pi") for sign in ("1", "-1")]
     else:
         starts = [start]
-    search = _Search(connection, maximise, harmonics, float(penalty), int(steps))
+    search = _Search(connection, maximise, harmonics, float(penalty), steps)
     tables = [_table(gait_path(each, k, amplitude, centre).fourier, k, harmonics) for each in starts]
     # of the two directions the better one: the other would have to turn round first
     best = max(tables, key=lambda table: float(search.objective(table)))

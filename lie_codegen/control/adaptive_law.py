@@ -204,6 +204,11 @@ def _basis(basis: Sequence[Any] | None, n: int) -> tuple[sp.ImmutableMatrix, ...
     if basis is None:
         places = [(i, i) for i in range(n)] + [(i, j) for i in range(n) for j in range(i + 1, n)]
         return tuple(sp.ImmutableMatrix(n, n, lambda r, c, p=p: int((r, c) in (p, p[::-1]))) for p in places)
+    most = n * (n + 1) // 2
+    if isinstance(basis, str) or len(basis) > most:
+        raise InputError(
+            f"adaptive_law: basis takes up to {most} symmetric {n} x {n} matrices, so many are independent"
+        )
     made = tuple(symmetric_matrix(each, n, f"basis[{k}]") for k, each in enumerate(basis))
     if not made or sp.Matrix([list(each) for each in made]).rank() < len(made):
         raise InputError("adaptive_law: the matrices of the basis are linearly dependent, or there are none")

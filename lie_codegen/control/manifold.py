@@ -20,8 +20,10 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.control.manifold_plant import ManifoldPlant, manifold_plant
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
@@ -300,7 +302,9 @@ def manifold(
         ShapeError, ExpressionError: shapes, or texts outside the grammar.
     """
     if isinstance(size, bool) or not isinstance(size, int | np.integer) or size < 1:
-        raise InputError(f"manifold: the number of coordinates is 1, 2, ..., not {size!r}")
+        raise InputError(f"manifold: the number of coordinates is 1, 2, ..., not {shown(size)}")
+    if size > current_budget().dimension:
+        raise InputError(over("dimension", f"manifold: {shown(size)} coordinates"))
     n, q = int(size), symbols_of("q", int(size))
     names: dict[str, sp.Expr] = {symbol.name: symbol for symbol in q} | {"pi": sp.pi}
     for key, value in (parameters or {}).items():

@@ -230,9 +230,8 @@ def reference(
             raise InputError("reference: give the plan as plan= or in the place of formulas, not both")
         formulas = plan
     # A reference that is made again from its definition is given texts such as "1/100000000".
-    duration, smoothing, tolerance = (
-        double(each) if isinstance(each, str) else each for each in (duration, smoothing, tolerance)
-    )
+    duration, smoothing = (double(each) if isinstance(each, str) else each for each in (duration, smoothing))
+    tolerance = double(tolerance) if isinstance(tolerance, str) else tolerance
     if duration is not None:
         if not all(hasattr(formulas, name) for name in ("X", "u", "duration")):
             raise InputError("reference: duration= goes with a plan")

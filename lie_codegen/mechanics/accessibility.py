@@ -22,6 +22,7 @@ from typing import Any, TypeAlias
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.subspace import bracket
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.counts import count_between
 from lie_codegen.exact.numbers import domain_matrix, exact_number
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
@@ -31,6 +32,8 @@ from lie_codegen.mechanics.euler_poincare import euler_poincare, velocity_symbol
 from lie_codegen.on_demand import sympy as sp
 
 _DEGREE = 4
+#: Levels of brackets, products or derivatives: each has several times the terms of the one before.
+_MOST_LEVELS = 12
 
 Vector: TypeAlias = "list[sp.Expr]"
 
@@ -69,9 +72,10 @@ def second_order_controllability(
 
     Raises:
         ShapeError: a force has not n entries.
-        InputError: no force.
+        InputError: no force; a degree outside 1 to 12.
     """
     algebra = as_algebra(group, "second_order_controllability")
+    degree = count_between(degree, 1, _MOST_LEVELS, "second_order_controllability: degree")
     inertia = metric_of(algebra, inertia)
     fields = [list(inertia.inv() * sp.Matrix(force)) for force in force_vectors(algebra, forces)]
     levels = _symmetric_levels(algebra, inertia, fields, degree)
@@ -116,8 +120,10 @@ def accessibility_rank(
 
     Raises:
         ShapeError: a force or xi has not n entries.
+        InputError: a depth outside 0 to 12.
     """
     algebra = as_algebra(group, "accessibility_rank")
+    depth = count_between(depth, 0, _MOST_LEVELS, "accessibility_rank: depth")
     inertia = metric_of(algebra, inertia)
     n = algebra.dim
     symbols = velocity_symbols(algebra)
@@ -162,7 +168,9 @@ def direction_observability(
 
     Raises:
         ShapeError: y or omega has not three entries.
+        InputError: derivatives outside 0 to 12.
     """
+    derivatives = count_between(derivatives, 0, _MOST_LEVELS, "direction_observability: derivatives")
     if len(y) != 3 or len(omega) != 3:
         raise ShapeError("y and omega have three entries each")
     inertia = inertia if isinstance(inertia, sp.MatrixBase) else positive_matrix(inertia, 3, "inertia")

@@ -24,6 +24,8 @@ from lie_codegen.runtime.sources import build_source
 REACHED, EVENT, FULL, STUCK = 0, 1, 2, 3
 _CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)
 _FIRST_KNOTS, _MOST_DOUBLES = 256, 2**27
+#: From so many knots on, steps of the present length that would fill the memory many times over end a run at once.
+_ENOUGH_KNOTS, _HOPELESS = 8192, 64
 
 
 class _Field(ctypes.Structure):
@@ -234,9 +236,11 @@ def integrate(
         if status != FULL:
             event = int(result[2]) if status == EVENT else -1
             return Motion(np.concatenate(pieces_t), np.concatenate(pieces_y), status, event, evaluations, rate)
-        if held * rate.size > _MOST_DOUBLES:
+        ahead = (kept - 1) * abs(t1 - times[kept - 1]) / max(abs(times[kept - 1] - times[0]), 5e-324)
+        hopeless = held > _ENOUGH_KNOTS and ahead * rate.size > _HOPELESS * _MOST_DOUBLES
+        if held * rate.size > _MOST_DOUBLES or hopeless:
             raise ComputationError(
-                f"the solution takes more than {held} steps up to t = {times[kept - 1]:.6g}: it is stiff, or too long"
+                f"the solution takes {held} steps up to t = {times[kept - 1]:.6g} of {t1:.6g}: it is stiff, or too long"
             )
         count = min(2 * count, max(_FIRST_KNOTS, _MOST_DOUBLES // (8 * rate.size)))
 

@@ -74,27 +74,46 @@ def table(rows: list[tuple[str, int, int, float]]) -> str:
     return "\n".join(lines)
 
 
+def read_table(text: str) -> list[tuple[str, int, int, float]]:
+    """The figures of `table`."""
+    cells = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ")
+    ]
+    return [
+        (what, int(tried.replace(",", "")), int(found), float(seconds)) for what, tried, found, seconds in cells[1:]
+    ]
+
+
+def joined(
+    old: list[tuple[str, int, int, float]], new: list[tuple[str, int, int, float]], order: list[str]
+) -> list[tuple[str, int, int, float]]:
+    """The rows of parts that there are, the new one of each where it was hunted again."""
+    rows = {row[0]: row for row in (*old, *new)}
+    return [rows[what] for what in order if what in rows]
+
+
 def main() -> int:
     """Hunt, print, and write if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scale", type=int, default=1)
-    parser.add_argument("--only", default="", help="parts whose name holds this")
+    parser.add_argument("--only", default="", help="parts whose name holds this; the others keep their rows")
     parser.add_argument("--write", action="store_true", help="put the table into SECURITY.md")
     asked = parser.parse_args()
     rows, finds = [], []
     with tempfile.TemporaryDirectory(prefix="hunt-") as folder:
-        for what, part in parts(asked.scale, Path(folder)).items():
+        every = parts(asked.scale, Path(folder))
+        for what, part in every.items():
             if asked.only in what:
                 began = time.perf_counter()
                 tried, found = part()
                 rows.append((what, tried, len(found), time.perf_counter() - began))
                 finds += found
                 print(f"{what}: {tried:,} tried, {len(found)} found", *found, sep="\n", flush=True)  # noqa: T201
-    text = table(rows)
-    print(text)  # noqa: T201
+    print(table(rows))  # noqa: T201
     if asked.write:
         head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        tail = rest.partition(END)[2]
+        before, _, tail = rest.partition(END)
+        text = table(joined(read_table(before), rows, list(every)) if asked.only else rows)
         commit = subprocess.run(
             ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
         ).stdout.strip()

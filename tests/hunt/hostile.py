@@ -22,6 +22,7 @@ import sympy as sp
 
 import lie_codegen as lc
 from lie_codegen.errors import LieCodegenError
+from tests.hunt.plausible import plausible_arguments
 
 INF, NAN = float("inf"), float("nan")
 
@@ -83,107 +84,11 @@ def _endless() -> list[Any]:
     return value
 
 
-def _law() -> Any:
-    return lc.tracking_law("so3", inertia=[1, 2, 2], error="so3_right", gains={"K_p": [1, 1, 1], "K_d": 1})
-
-
-def _cart() -> Any:
-    return lc.lagrangian_system(coordinates=["x"], lagrangian="dx^2/2 - x^2/2", forces={"x": "u"})
-
-
-def _body() -> Any:
-    return lc.free_rigid_body([3, 2, 1])
-
-
-def _flow() -> Any:
-    return lc.euler_average(_body(), ["-0.2*w1", "0.1*w2", "-0.1*w3"])
-
-
-#: Plausible arguments by the name of the parameter; what is not here is left to its default, or gets 1.0.
-PLAUSIBLE: dict[str, Callable[[], Any]] = {
-    "group": lambda: "so3",
-    "name_or_path": lambda: "so3",
-    "what": lambda: "so3",
-    "a": lambda: "so3",
-    "b": lambda: "r3",
-    "u": lambda: lc.PeriodicInput(["cos(t)", "sin(t)", "0"]),
-    "inertia": lambda: [1.0, 2.0, 2.5],
-    "name": lambda: "thing",
-    "namespace": lambda: "thing",
-    "labels": lambda: ["a", "b"],
-    "brackets": lambda: {("a", "b"): {"b": 1}},
-    "matrices": lambda: [[[0, 1], [0, 0]], [[1, 0], [0, -1]]],
-    "combinations": lambda: {"a": {"w1": 1}, "b": {"w2": 1}, "c": {"w3": 1}},
-    "controls": lambda: ["w1", "w2"],
-    "target": lambda: [0.1, 0.2, 0.3],
-    "duration": lambda: 1.0,
-    "eps": lambda: 0.1,
-    "order": lambda: 2,
-    "t": lambda: [0.0, 0.5, 1.0],
-    "X": lambda: np.eye(3),
-    "Y": lambda: np.eye(3),
-    "X0": lambda: np.eye(3),
-    "X_d": lambda: np.eye(3),
-    "Xs": lambda: np.array([np.eye(3), np.eye(3)]),
-    "R": lambda: np.eye(3),
-    "q": lambda: [1.0, 0.0, 0.0, 0.0],
-    "s": lambda: 0.5,
-    "xi": lambda: [0.1, 0.2, 0.3],
-    "xi0": lambda: [0.1, 0.2, 0.3],
-    "xi_d": lambda: [0.0, 0.0, 0.0],
-    "x": lambda: [0.1, 0.2, 0.3],
-    "y": lambda: [0.1, 0.2, 0.3],
-    "gains": lambda: {"K_p": [1, 1, 1], "K_d": 1},
-    "error": lambda: "so3_right",
-    "law": _law,
-    "system": _cart,
-    "flow": _flow,
-    "body": _body,
-    "kernel": lambda: lc.group_kernels("so3")[0],
-    "port": lambda: "g",
-    "components": lambda: ["cos(t)", "sin(t)", "0"],
-    "coordinates": lambda: ["x"],
-    "lagrangian": lambda: "dx^2/2 - x^2/2",
-    "forces": lambda: {"x": "u"},
-    "estimates": lambda: [lc.Uncertain("so3", np.eye(3), np.eye(3) * 1e-4)],
-    "covariance": lambda: np.eye(3) * 1e-4,
-    "times": lambda: [0.0, 0.5, 1.0],
-    "values": lambda: [[0.0, 0.0, 0.0]] * 3,
-    "library": lambda: "scipy",
-    "qubits": lambda: 1,
-    "path": lambda: "/no/such/file",
-    "folder": lambda: "/proc/none",
-    "center": lambda: [0.0, 0.0, 1.0],
-    "radius": lambda: 0.1,
-    "axis": lambda: [0.0, 0.0, 1.0],
-    "direction": lambda: [0.0, 0.0, 1.0],
-    "half_angle": lambda: 0.3,
-    "point": lambda: [0.0, 0.0, 1.0],
-    "element": lambda: np.eye(3),
-    "formula": lambda: "X[0][0] - 1/2",
-    "delta": lambda: 0.1,
-    "directions": lambda: np.eye(3),
-    "positions": lambda: np.eye(3),
-    "weights": lambda: [1.0, 1.0],
-    "position": lambda: ["cos(t)", "sin(t)", "0"],
-    "perturbation": lambda: ["-0.2*w1", "0.1*w2", "-0.1*w3"],
-    "vehicle": lambda: lc.underwater_vehicle("se3", inertia=1),
-    "fields": lambda: lc.vibrational_fields(_cart(), lc.PeriodicInput(["cos(t)"])),
-    "intervals": lambda: 4,
-    "mass": lambda: 1,
-    "B": lambda: np.eye(3),
-    "omega": lambda: 1.0,
-    "steps": lambda: 3,
-    "parameters": lambda: None,
-    "problem": lambda: lc.ocp("so3", duration=1.0, intervals=4, controls=["w1", "w2"], bounds={"u": 1.0}),
-}
 #: Files, pictures and whole pipelines have tests of their own; these names are records of results.
 LEFT_OUT = {
     "kernel_factory", "Plan", "Status", "ClosedLoop", "Trajectory", "Propagator", "Kernel", "MatrixGroup", "plot_plan", "load",
     "generate", "generate_closed_loop", "build", "group_names",
 }  # fmt: skip
-#: Not given again to every call: weights of a mean have another length than those of a plan, and so on.
-_OPTIONAL = {"controls", "duration", "t"}
 
 
 class LateError(Exception):
@@ -194,19 +99,23 @@ def alarmed(seconds: float, call: Callable[[], Any]) -> Any:
     """The result of a call.
 
     Raises:
-        LateError: it took longer; what runs in C may ring late.
+        LateError: it took longer, of this process's own time, or many times longer by the clock; what runs in C may ring late.
     """
 
     def ring(number: int, frame: FrameType | None) -> None:
         raise LateError(f"over {seconds:g} s")
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    # By the clock alone a busy machine would be late; by the processor alone what waits for a FIFO would never be.
+    timers = ((signal.SIGPROF, signal.ITIMER_PROF, seconds), (signal.SIGALRM, signal.ITIMER_REAL, 12 * seconds))
+    before = [signal.signal(number, ring) for number, _, _ in timers]
     try:
+        for _, timer, allowed in timers:
+            signal.setitimer(timer, allowed)
         return call()
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for (number, timer, _), handler in zip(timers, before, strict=True):
+            signal.setitimer(timer, 0)
+            signal.signal(number, handler)
 
 
 def judged(seconds: float, call: Callable[[], Any]) -> str | None:
@@ -227,17 +136,6 @@ def _found(error: Exception) -> str:
     ours = [frame for frame in traceback.extract_tb(error.__traceback__) if "lie_codegen/" in frame.filename]
     where = ours[-1] if ours else last
     return f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {str(error)[:120]}"
-
-
-def plausible_arguments(function: Any) -> dict[str, Callable[[], Any]]:
-    """{parameter: maker} of a call that is nearly right."""
-    chosen = {}
-    for name, parameter in inspect.signature(function).parameters.items():
-        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
-            continue
-        if parameter.default is parameter.empty or name in _OPTIONAL:
-            chosen[name] = PLAUSIBLE.get(name, lambda: 1.0)
-    return chosen
 
 
 def public_functions() -> Iterator[tuple[str, Any]]:

@@ -118,3 +118,9 @@ def test_the_page_has_the_figures_of_the_last_hunt() -> None:
     rows = [line for line in figures.splitlines() if line.startswith("| ") and not line.startswith("| hunted")]
     assert len(rows) >= 10
     assert all(int(row.split("|")[2].replace(",", "")) > 0 for row in rows)
+
+
+def test_a_part_hunted_again_replaces_its_row_alone() -> None:
+    old = [("a", 1000, 0, 3.0), ("gone", 5, 0, 1.0), ("b", 7, 1, 20.0)]
+    assert whole.read_table(whole.table(old)) == old
+    assert whole.joined(old, [("b", 9, 0, 2.0)], ["a", "b", "c"]) == [("a", 1000, 0, 3.0), ("b", 9, 0, 2.0)]
