@@ -150,7 +150,7 @@ def _coordinates(axes: Any, plan: Plan, t: Array, X: Array) -> None:
 
 def _second_kind(plan: Plan, t: Array) -> Array | None:
     drift = plan.details.get("drift")
-    if "inertia" in plan.details:
+    if "inertia" in plan.details or "start" in plan.details or getattr(plan.details.get("system"), "right", False):
         return None
     try:
         return simulate(plan.group, plan.u if drift is None else plan.u.plus(drift), t=t).g

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.flow.simulate import simulate
 from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.pictures.result import new_figure
 from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
@@ -43,11 +42,10 @@ def draw_plan(plan: Plan, minimum: float | None = None, obstacles: Sequence[Obst
 
 def _motion(plan: Plan, t: Array) -> tuple[Array, Array]:
     """X and the controlled velocities of the true system: under torques if the plan's controls are."""
-    inertia, drift = plan.details.get("inertia"), plan.details.get("drift")
+    inertia = plan.details.get("inertia")
     if inertia is not None:
-        run = simulate_driven(plan.group, plan.u, inertia, t=t, xi0=plan.details["start_velocity"])
-        return run.X, run.xi
-    return simulate(plan.group, plan.u if drift is None else plan.u.plus(drift), t=t).X, plan.u(t)
+        return plan.X(t), simulate_driven(plan.group, plan.u, inertia, t=t, xi0=plan.details["start_velocity"]).xi
+    return plan.X(t), plan.u(t)
 
 
 def _controls(axes: Any, plan: Plan, t: Array) -> None:

@@ -23,6 +23,8 @@ from lie_codegen.values import Value, settle
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
 PACKAGE = "lie_codegen.steering.plan_package"
+#: What flies a plan, the same.
+PATH = "lie_codegen.steering.plan_path"
 #: Times beyond the ends, relative to the duration, that are rounding.
 _ROUNDING = 1e-9
 
@@ -259,15 +261,10 @@ class Plan(Saved):
         Raises:
             InputError: a time is outside [0, duration].
         """
-        from lie_codegen.flow.simulate import simulate
-
         times = np.asarray(t, dtype=float)
         self.u(times.ravel())  # refuses times outside
-        start = self.details.get("start")
         knots, place = np.unique(np.append(times.ravel(), [0.0, self.duration]), return_inverse=True)
-        drift = self.details.get("drift")
-        velocity = self.u if drift is None else self.u.plus(np.asarray(drift, dtype=float))
-        path = simulate(self.group, velocity, t=knots, X0=start).X
+        path = import_module(PATH).states(self, knots)
         found: Array = path[place[: times.size]].reshape(*times.shape, *path.shape[1:])
         return found
 

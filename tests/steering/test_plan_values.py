@@ -12,9 +12,11 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import InputError, NotFiniteError
@@ -128,3 +130,31 @@ def test_printed_targets_report_their_distance() -> None:
     plan = planned("optimal", np.round(X, 7))
     assert 0 < plan.projected < 1e-6
     assert plan.projected == pytest.approx(lc.nearest(so3, np.round(X, 7)).distance, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"drift": (0, 0, 0.3)},
+        {"drift": (0, 0, 0.3), "start": (0.1, 0.2, 0.3)},
+        {"drift": ("0", "0", "0.3*sin(t)")},
+        {"drift": (0, 0, 0.3), "start": (0.1, 0.2, 0.3), "equation": "right"},
+        {"drift": (0, 0, 0.3), "start": (0.1, 0.2, 0.3), "method": "ocp"},
+        {"inertia": (1, 2, 3), "dynamics": "second_order", "controls": ("w1", "w2", "w3")},
+    ],
+)
+def test_the_path_of_a_plan_is_that_of_its_own_system(options: dict[str, Any]) -> None:
+    """Drift, start, the side that the velocity acts on, inertia: X(t) of the plan begins where it says and ends at the target."""
+    so3 = lc.group("so3")
+    target = expm(so3.hat([0.4, -0.3, 0.7]))
+    given = {"controls": ("w1", "w2"), **options}
+    if "start" in given:
+        given["start"] = expm(so3.hat(given["start"]))
+    plan = lc.steer(so3, target, given.pop("controls"), 6.0, **given)
+    path = plan.X([0.0, 3.0, 6.0])
+    np.testing.assert_allclose(path[0], given.get("start", np.eye(3)), atol=1e-12)
+    np.testing.assert_allclose(path[2], target, atol=1e-8)
+    if given.get("equation") == "right":
+        a, b = plan.X(3.0), plan.X(3.0 + 1e-5)
+        rate = so3.hat(plan.u(3.0) + np.array([0, 0, 0.3]))
+        np.testing.assert_allclose((b - a) / 1e-5, rate @ a, atol=1e-4)

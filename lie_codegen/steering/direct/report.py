@@ -49,6 +49,10 @@ def plan_of(
         "fidelity": fidelity(task, found.X, variant),
         **details,
     }
+    if not system.right and system.drift.constant is not None and np.any(system.drift.constant):
+        told["drift"] = system.drift.constant
+    if np.any(system.start != np.eye(group.degree)):
+        told["start"] = system.start
     return Plan(
         group=group,
         target=aim,

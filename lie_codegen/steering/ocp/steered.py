@@ -14,6 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
+from lie_codegen.steering.direct.system import velocity
 from lie_codegen.steering.goals import Pointing, Position
 from lie_codegen.steering.ocp.problem_data import Affine
 from lie_codegen.steering.ocp.stage_controls import StageControls
@@ -105,10 +106,24 @@ def open_plan(
             found.X_final,
             found.error,
             Status.LOCAL if found.error <= tolerance else Status.NOT_CONVERGED,
-            {"plan": found, "problem": problem, "inputs": StageControls(found.u, found.duration)},
+            {
+                "plan": found,
+                "problem": problem,
+                "inputs": StageControls(found.u, found.duration),
+                **({} if start is None else {"start": np.asarray(found.X[0])}),
+                **_constant_drift(group, drift),
+            },
             {"solve": time.perf_counter() - began},
         ),
     )
+
+
+def _constant_drift(group: MatrixGroup, drift: Any) -> dict[str, Array]:
+    """The drift as a fact of the plan, where there is one and it is a constant."""
+    if drift is None:
+        return {}
+    constant = velocity(group, drift, f"steer({group.name}): drift").constant
+    return {} if constant is None else {"drift": constant}
 
 
 def _goal(
