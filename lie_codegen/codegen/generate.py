@@ -23,6 +23,7 @@ def generate(
     real: str = "double",
     target: str = "c",
     starts: Mapping[str, Mapping[str, tuple[float, ...]]] | None = None,
+    schedule: Mapping[str, str | int | float] | None = None,
 ) -> Path:
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
@@ -35,13 +36,14 @@ def generate(
         real: "double", or "float" for processors that have no double; the formulas are the same.
         target: what surrounds the C, see `lie_codegen.codegen.targets`.
         starts: {symbol: {port: numbers}} at which a unit of such a function starts; its first test vector where none is given.
+        schedule: in what order a unit calls the functions of a closed loop, as in `PackageParts`.
 
     Raises:
         CodegenError: a kernel cannot become C, two symbols collide, or a constant is beyond the range of float.
         IdentifierError: the namespace is no C identifier.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    tree = render_package(namespace, kernels, _metadata(metadata), extra, real, starts)
+    tree = render_package(namespace, kernels, _metadata(metadata), extra, real, starts, schedule)
     return write_package(with_target(tree, target, real), folder)
 
 

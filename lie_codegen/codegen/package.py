@@ -52,10 +52,11 @@ def render_package(
     extra: Mapping[str, str] | None = None,
     real: str = "double",
     starts: Mapping[str, Mapping[str, tuple[float, ...]]] | None = None,
+    schedule: Mapping[str, str | int | float] | None = None,
 ) -> dict[str, str]:
     """The package as {path: text}, in double or float, with `extra` files of the same form; writes nothing.
 
-    `starts`: {symbol: {port: numbers}}, told in the manifest.
+    `starts`: {symbol: {port: numbers}}, and `schedule`, as in `PackageParts`, told in the manifest.
 
     Raises:
         CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
@@ -88,7 +89,7 @@ def render_package(
         "README.md": render("README.md.jinja", package=view, **files),
         **(extra or {}),
     }
-    return {**tree, "manifest.json": _manifest(view, kernels, tree, starts or {})}
+    return {**tree, "manifest.json": _manifest(view, kernels, tree, starts or {}, schedule or {})}
 
 
 def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
@@ -196,6 +197,7 @@ def _manifest(
     kernels: Sequence[Kernel],
     tree: Mapping[str, str],
     starts: Mapping[str, Mapping[str, tuple[float, ...]]],
+    schedule: Mapping[str, str | int | float],
 ) -> str:
     data: dict[str, Any] = {
         "generator": GENERATOR,
@@ -205,6 +207,7 @@ def _manifest(
         "numerics": NUMERICS_VERSION,
         **({"real": view.type_name} if view.type_name != "double" else {}),
         "functions": [_function(kernel, starts.get(kernel.symbol)) for kernel in kernels],
+        **({"schedule": dict(schedule)} if schedule else {}),
         "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
     }
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"

@@ -16,12 +16,16 @@ class PackageParts:
     kernels: what is printed as functions.
     files: {path: text}; src/*.c and include/*.h join the library, *.c beside them are programs that test themselves.
     starts: {symbol: {port: numbers}}: where a function that steps begins, for units that other programs step.
+    schedule: of a closed loop, in what order a unit calls its functions: symbols "step", "control" and "reference" ("" where there is
+        none); "stages" of the reference a step; seconds "period" between steps at most, "sample" between calls of the law (0: at every
+        stage); "delay" in samples, "command" its doubles; "input", the port that the simulator gives: the others are parameters.
     """
 
     namespace: str
     kernels: tuple[Kernel, ...]
     files: Mapping[str, str] = field(default_factory=dict)
     starts: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
+    schedule: Mapping[str, str | int | float] = field(default_factory=dict)
 
 
 @runtime_checkable

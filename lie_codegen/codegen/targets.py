@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lie_codegen.codegen.fmu_loop import loop_unit
 from lie_codegen.codegen.templates import render
 from lie_codegen.errors import CompileError, InputError, MissingDependencyError
 
@@ -150,7 +151,18 @@ def _functions(manifest: Mapping[str, Any], tree: Mapping[str, str]) -> list[_Fu
         formula = " ".join(str(each.get("formula") or each["name"]).split())
         start = {port.name: values for port, values in cases[0].inputs} if cases else {}
         start |= {port: [repr(float(number)) for number in numbers] for port, numbers in each.get("start", {}).items()}
-        found.append(_Function(each["name"], each["symbol"], formula, inputs, outputs, cases, tunable, start))
+        found.append(
+            _Function(
+                each["name"],
+                each["symbol"],
+                formula,
+                inputs,
+                outputs,
+                cases,
+                tunable,
+                start,
+            )
+        )
     names = [each.name for each in found]
     return [each if names.count(each.name) == 1 else replace(each, name=each.symbol) for each in found]
 
@@ -270,9 +282,12 @@ def _put(folder: Path, files: Mapping[str, str]) -> None:
 
 def _fmu(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dict[str, str]:
     functions = _functions(manifest, tree)
+    if manifest.get("schedule"):
+        variables, unit, at = loop_unit(manifest["schedule"], functions, _variable)
+        return _fmu_files(manifest, tree, variables, [], at, unit)
     steps = [each for each in functions if each.is_step]
     shown = steps or functions
-    variables: list[dict[str, Any]] = []
+    variables = []
     calls = []
     at = 0
     for function in shown:
@@ -316,10 +331,22 @@ def _fmu(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dic
             outputs.append({"role": "", "c": "", "at": at, "size": port.size})
             at += port.size
         calls.append({"symbol": function.symbol, "is_step": function.is_step, "inputs": inputs, "outputs": outputs})
+    return _fmu_files(manifest, tree, variables, calls, at, None)
+
+
+def _fmu_files(
+    manifest: Mapping[str, Any],
+    tree: Mapping[str, str],
+    variables: Sequence[dict[str, Any]],
+    calls: Sequence[dict[str, Any]],
+    total: int,
+    unit: dict[str, Any] | None,
+) -> dict[str, str]:
+    """The description of the unit and its C."""
     token = "{" + hashlib.sha256(tree["manifest.json"].encode()).hexdigest()[:32] + "}"
     names = {
         "namespace": manifest["namespace"], "version": manifest["version"], "token": token, "variables": variables, "functions": calls,
-        "total": at, "sources": ["fmi3.c", *(Path(path).name for path in _sources(tree))],
+        "total": total, "unit": unit, "sources": ["fmi3.c", *(Path(path).name for path in _sources(tree))],
     }  # fmt: skip
     return {
         "fmu/modelDescription.xml": render("fmi3_modelDescription.xml.jinja", **names),

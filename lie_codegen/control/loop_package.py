@@ -65,7 +65,20 @@ def loop_parts(run: Run, reference: Any, parts: int, name: str | None, real: str
     own = [loop_control(loop), loop_motion(loop)] if sampled else [loop_step(loop)]
     view = _view(quiet, parts, package, real, own, moving)
     files = {f"{package}_loop.c": render("loop_replay.c.jinja", loop=view)}
-    return PackageParts(package, (*kernels, *moving, *own), files, {each.symbol: _start(quiet, each) for each in own})
+    starts = {each.symbol: _start(quiet, each) for each in own}
+    gap = run.sample if sampled else float(run.times[1] - run.times[0])
+    schedule = {
+        "step": own[-1].symbol,
+        "control": own[0].symbol if sampled else "",
+        "reference": moving[0].symbol if moving else "",
+        "stages": 1 if sampled else 3,
+        "period": gap / parts,
+        "sample": run.sample if sampled else 0.0,
+        "delay": run.delay if sampled else 0,
+        "command": loop.plant.sizes[2],
+        "input": "noise",
+    }
+    return PackageParts(package, (*kernels, *moving, *own), files, starts, schedule)
 
 
 def _start(run: Run, kernel: Kernel) -> dict[str, tuple[float, ...]]:
@@ -78,6 +91,8 @@ def _start(run: Run, kernel: Kernel) -> dict[str, tuple[float, ...]]:
             found["state"] = tuple(state.tolist())
         elif port.name == "t":
             found["t"] = (float(run.times[0]),)
+        elif port.name == "noise":
+            found["noise"] = (0.5,) * port.size  # the median: no noise
         elif port.name in run.numbers:
             found[port.name] = tuple(np.ravel(run.numbers[port.name]).tolist())
     return found

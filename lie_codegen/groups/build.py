@@ -147,8 +147,17 @@ def generate(
     namespace = parts[0].namespace if parts and name is None else _package_name(kernels, name)
     metadata = None if alone is None else _metadata(alone)
     starts = {symbol: ports for each in parts for symbol, ports in each.starts.items()}
+    schedules = [each.schedule for each in parts if each.schedule]
     written = generate_package(
-        kernels, folder, namespace=namespace, metadata=metadata, extra=extra, real=real, target=target, starts=starts
+        kernels,
+        folder,
+        namespace=namespace,
+        metadata=metadata,
+        extra=extra,
+        real=real,
+        target=target,
+        starts=starts,
+        schedule=schedules[0] if len(schedules) == 1 else None,
     )
     if target == "fmu":
         pack_fmu(written, [each.command for each in find_compilers()])

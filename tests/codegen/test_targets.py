@@ -151,6 +151,53 @@ def test_a_closed_loop_as_a_unit(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no compiler")
+@pytest.mark.parametrize("how", [{}, {"sample": 0.1}, {"sample": 0.1, "delay": 0.2, "noise": {"X": 1e-9}}])
+def test_a_loop_that_follows_a_reference_is_one_unit(tmp_path: Path, how: dict[str, Any]) -> None:
+    """The reference and the law are called inside, at their own times, whatever the steps of the simulator."""
+    law = lc.tracking_law("se2", inertia=[2, 3, 4], error="se2_1", gains={"K_1": (4, 4), "K_2": 4, "K_d": (5, 5, 5)})
+    loop = lc.closed_loop(
+        "se2", law=law, inertia=[2, 3, 4], reference=lc.reference("se2", ["t/4", "1/2", "sin(t)/3"]),
+        X0=lc.build("se2").exp([0.3, 0.5, -0.2]), t=np.linspace(0, 3, 31), step=0.02, seed=0, **how,
+    )  # fmt: skip
+    quiet = lc.closed_loop(
+        "se2", law=law, inertia=[2, 3, 4], reference=lc.reference("se2", ["t/4", "1/2", "sin(t)/3"]),
+        X0=lc.build("se2").exp([0.3, 0.5, -0.2]), t=np.linspace(0, 3, 31), step=0.02, **{k: v for k, v in how.items() if k != "noise"},
+    )  # fmt: skip
+    unit = Unit(lc.generate(loop, tmp_path / "loop", target="fmu") / "se2.fmu", tmp_path / "unit")
+    if "noise" in how:
+        assert unit.variables["sigma_X"].attrib["causality"] == "parameter"
+        assert unit.set("sigma_X", 0.0) == 0
+    assert {name for name, each in unit.variables.items() if each.attrib["causality"] == "input"} <= {"noise"}
+    steps = [0.1] * 15 + [0.05, 0.25, 0.02, 0.08, 0.1] + [0.25] * 4
+    t = 0.0
+    for h in steps:
+        unit.step(t, h)
+        t = round(t + h, 9)
+    assert t == 3.0
+    # the simulator's steps cut those of the integration, whose fourth power remains
+    assert np.max(np.abs(unit.get("state")[:6] - quiet.X[-1][:2].ravel())) < (1e-10 if "sample" in how else 1e-6)
+    assert quiet.X_d is not None
+    assert np.max(np.abs(unit.get("X_d") - quiet.X_d[-1].ravel())) < 1e-12
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no compiler")
+def test_the_gains_of_a_loop_are_tuned_while_it_runs(tmp_path: Path) -> None:
+    law = lc.attitude_law("pd", inertia="input", k_p="input", k_d="input")
+    start = lc.build("so3").exp([1, 0.5, 0.2])
+    given = {"law": law, "inertia": [1, 2, 3], "X0": start, "t": np.linspace(0, 2, 11), "sample": 0.05, "step": 0.05}
+    loop = lc.closed_loop("so3", gains={"k_p": 4, "k_d": 6}, **given)
+    unit = Unit(lc.generate(loop, tmp_path / "loop", target="fmu") / "so3.fmu", tmp_path / "unit")
+    for name in ("inertia", "k_p", "k_d"):
+        assert unit.variables[name].attrib["causality"] == "parameter"
+        assert unit.variables[name].attrib["variability"] == "tunable"
+    assert unit.set("k_p", 7.0) == 0
+    for k in range(40):
+        unit.step(0.05 * k, 0.05)
+    other = lc.closed_loop("so3", gains={"k_p": 7, "k_d": 6}, **given)
+    assert np.max(np.abs(unit.get("state")[:9] - other.X[-1].ravel())) < 1e-13
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no compiler")
 def test_a_unit_is_valid_and_runs_in_a_simulator(law: lc.Kernel, tmp_path: Path) -> None:
     validation = pytest.importorskip("fmpy.validation")
     import fmpy

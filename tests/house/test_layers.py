@@ -39,6 +39,8 @@ ALLOWED = {
     "qutip_qtrl": {"benchmarks"},
     "mpmath": {"gallery"},
     "matplotlib": {"pictures", "gallery"},
+    "anywidget": {"pictures"},
+    "traitlets": {"pictures"},
     "typer": {"cli"},
     "rich": {"cli", "studies"},
     "platformdirs": {"runtime"},
