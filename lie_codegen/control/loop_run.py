@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_model import NOISE, Loop
@@ -17,6 +18,8 @@ from lie_codegen.runtime.threads import step_pieces
 
 MOST_STEPS = 2**21
 _LARGEST_MOVE = 0.25
+#: Steps from which errors that fall like the step are taken for those of a jump.
+_JUMPED_AFTER = 2**12
 #: Steps for which the reference is held in memory at once.
 _BLOCK = 20_000
 #: Loops of which the error is estimated, where there are many.
@@ -149,7 +152,8 @@ def refined(run: Run, tolerance: float, narrower: Callable[[Run, Array], Run]) -
     Of many loops under a sampled law, which cannot do without their noise, 64 are watched; the others then take the same steps.
 
     Raises:
-        ComputationError: two million steps do not bring the error below the tolerance, or the state is no longer finite.
+        ComputationError: two million steps do not bring the error below the tolerance, or the state is no longer finite; the law
+            jumps on the way, which equal steps meet to a step only.
     """
     watched, order = run, run.loop.plant.order
     if run.sample and len(run.start) > _WATCHED:
@@ -157,22 +161,48 @@ def refined(run: Run, tolerance: float, narrower: Callable[[Run, Array], Run]) -
     gap = run.sample or float(run.times[1] - run.times[0])
     spans = round((run.times[-1] - run.times[0]) / gap)
     place = run.loop.plant.sizes[0]
-    every, previous = 1, None
+    smooth = _smooth_columns(run.loop, run.start.shape[1]) if not run.sample else slice(None)
+    every, previous, errors = 1, None, list[float]()
     while every * spans <= max(MOST_STEPS, 2 * spans):
         states = watched.states(every)
         finite = bool(np.all(np.isfinite(states)))
         if finite and previous is not None:
-            error = float(np.max(np.abs(states - previous))) / 15
+            error = float(np.max(np.abs((states - previous)[..., smooth]))) / 15
             # A fast turn is followed in short steps, whatever two runs of too long ones agree on.
             turn = np.max(np.abs(states[..., place:])) * gap / every if order == 2 else 0.0
             if error <= tolerance and turn <= _LARGEST_MOVE:
                 return (states if watched is run else run.states(every)), every, error
+            errors.append(error)
+            if every * spans >= _JUMPED_AFTER and not run.sample and _of_first_order(run.loop, errors):
+                raise ComputationError(
+                    f"closed_loop({run.loop.plant.namespace}): the law jumps on the way, and equal steps meet a jump to a step only: "
+                    f"the error is {error:.1e} with {every * spans} steps and falls no faster than they shorten; give step=, or "
+                    "sample= as a controller calls the law"
+                )
         previous = states if finite else None
         every *= 2
     raise ComputationError(
         f"closed_loop({run.loop.plant.namespace}): {MOST_STEPS} steps do not bring the error below {tolerance:g}, or the state "
         "grows without bound; shorten the time, loosen the tolerance, or check the gains"
     )
+
+
+def _smooth_columns(loop: Loop, count: int) -> NDArray[np.bool_]:
+    """The columns of a state but those that are held from step to step, which lag by a step whatever its length is."""
+    kept = np.ones(count, dtype=bool)
+    place = sum(loop.plant.sizes[:2])
+    for each in loop.own_ports:
+        size = loop.own_size(each.port)
+        if each.kind == "held":
+            kept[place : place + size] = False
+        place += size
+    return kept
+
+
+def _of_first_order(loop: Loop, errors: list[float]) -> bool:
+    """Whether a law that holds a state has errors that fall like the step: three times in a row by less than a third."""
+    held = any(each.kind == "held" for each in loop.own_ports)
+    return held and len(errors) > 3 and all(b > a / 3 for a, b in zip(errors[-4:-1], errors[-3:], strict=True))
 
 
 def noise_stream(loop: Loop, seed: int, first: int) -> NoiseStream:
