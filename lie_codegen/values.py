@@ -51,9 +51,10 @@ class Value:
 
 
 def settle(record: Any, **kept: Any) -> None:
-    """Fields of a frozen record in the one form in which they are kept: for its own `__post_init__`, and nobody else.
+    """Fields of a frozen record in the one form in which they are kept: for its own `__post_init__`, and for what stands beside the
+    fields of a new one, as its definition.
 
-    The one place that goes round what frozen refuses; a record that is made never changes.
+    The one place that goes round what frozen refuses; a record that was handed out never changes.
     """
     for name, value in kept.items():
         object.__setattr__(record, name, value)

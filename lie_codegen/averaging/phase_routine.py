@@ -13,6 +13,7 @@ from lie_codegen.errors import CodegenError
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.kernel.routine import Routine, call_routine
 
 #: node(ops, x, phi) -> (F, G), per unit eps; clock(ops, x) -> Lambda. The phase has period 1.
@@ -97,11 +98,11 @@ def phase_routine(name: str, namespace: str, node: Node, clock: Clock, size: int
         Kernel(f"{name}_clock_rate", namespace, (x, v), derivatives, speed_rate),
     )
     levels = tuple(
-        {"limit": repr(float(limit)), "nodes": count, "primitive": [repr(float(p)) for p in primitive(count)]}
+        Definition(limit=repr(float(limit)), nodes=count, primitive=tuple(repr(float(p)) for p in primitive(count)))
         for limit, count in nodes.levels
     )
     settings = (
-        ("key", key), ("size", size), ("selector", nodes.selector), ("counts", nodes.levels), ("levels", Frozen(levels)),
+        ("key", key), ("size", size), ("selector", nodes.selector), ("counts", nodes.levels), ("levels", levels),
         ("node", helpers[0].symbol), ("node_rate", helpers[1].symbol), ("clock", helpers[2].symbol),
     )  # fmt: skip
 
@@ -123,16 +124,6 @@ def phase_routine(name: str, namespace: str, node: Node, clock: Clock, size: int
         return call_routine(ops, moved, [*inputs, *directions])
 
     return Routine(name, size + 2, 3 * size + 4, "phase_average.c.jinja", settings, helpers, twin, tangent)
-
-
-class Frozen(list[Any]):
-    """A list that a template reads, told apart by the other settings: it has a hash and equals every other."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return 0
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Frozen)
 
 
 def no_tangent(*_: Any) -> list[Scalar]:

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.phase_routine import Frozen, no_tangent, primitive
+from lie_codegen.averaging.phase_routine import no_tangent, primitive
 from lie_codegen.averaging.time_program import Program, Step, differentiated, indexed, program
 from lie_codegen.averaging.vector_field import FieldBody, along
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.kernel.routine import Routine, Tangent, call_routine
 
 
@@ -42,12 +43,12 @@ def time_routine(
     def made(name: str, steps: Program, results: list[str], inputs: int, tangent: Tangent, direction: bool) -> Routine:
         most = max(len(each.terms) for each in steps.steps if each.kind == "field")
         helpers = tuple(_derivative(name, namespace, field, size, count) for count in range(most + 1))
-        views = [_view(each, steps, [helper.symbol for helper in helpers]) for each in steps.steps]
+        views = [Definition(_view(each, steps, [helper.symbol for helper in helpers])) for each in steps.steps]
         lines = [f"{array}[M][N]" for array in steps.arrays] + [f"{mean}[N]" for mean in steps.means]
         settings = (
             ("key", key), ("size", size), ("order", order), ("nodes", nodes), ("period", repr(period)), ("direction", direction),
-            ("primitive", Frozen([repr(float(p)) for p in primitive(nodes)])), ("arrays", Frozen(lines)),
-            ("steps", Frozen(views)), ("results", Frozen(results)),
+            ("primitive", tuple(repr(float(p)) for p in primitive(nodes))), ("arrays", tuple(lines)),
+            ("steps", tuple(views)), ("results", tuple(results)),
         )  # fmt: skip
 
         def twin(values: Sequence[float]) -> Array:

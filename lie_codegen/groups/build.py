@@ -117,8 +117,9 @@ def generate(
         UncontrollableError: the controls of `steering` do not reach everything; says what is missing.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
+    from lie_codegen.codegen.fmu import pack_fmu
     from lie_codegen.codegen.generate import generate as generate_package
-    from lie_codegen.codegen.targets import check_target, pack_fmu
+    from lie_codegen.codegen.targets import check_target
     from lie_codegen.codegen.write import write_package
 
     check_target(target, real)

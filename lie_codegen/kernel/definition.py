@@ -25,6 +25,7 @@ import numpy as np
 
 from lie_codegen.kernel.plain_data import Definition, Factory, NoDefinitionError, makes_records
 from lie_codegen.kernel.records import RECORD, record_definition
+from lie_codegen.values import settle
 
 #: The kind of a group, and the length from which a fraction is shown with its decimal.
 _GROUP, _LONG = "lie_codegen.groups.definition:defined_group", 8
@@ -198,7 +199,7 @@ def record_factory(**reads: Callable[[Any], Any]) -> Callable[[Factory], Factory
 
     def define(function: Callable[[], Any], definition: Definition) -> Any:
         made = function()
-        object.__setattr__(made, "definition", definition)  # beside the fields, so that neither == nor repr sees it
+        settle(made, definition=definition)  # beside the fields, so that neither == nor repr sees it
         return made
 
     return _factory_of(define, None, reads)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar, unit_roundoff
 from lie_codegen.kernel.routine import call_routine
@@ -23,6 +23,8 @@ class Dual:
     value: Scalar
     tangent: Mapping[int, Scalar]
     level: int = 1
+    #: numpy leaves `array * dual` to the dual: the values are arrays, not the duals entries of one
+    __array_ufunc__: ClassVar[None] = None
 
     def __add__(self, other: Any) -> Any:
         if level_of(other) > self.level:

@@ -13,6 +13,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.plain_data import Definition, made_from
+from lie_codegen.values import settle
 
 #: body(ops, *inputs) -> outputs; vectors are lists, matrices lists of rows, scalars plain scalars.
 Body = Callable[..., tuple[Any, ...]]
@@ -118,7 +119,7 @@ class Kernel:
     def defined_by(self, definition: Definition) -> Kernel:
         """The same with its definition, which must determine it."""
         made = replace(self)
-        object.__setattr__(made, "definition", definition)
+        settle(made, definition=definition)
         return made
 
     def __copy__(self) -> Kernel:

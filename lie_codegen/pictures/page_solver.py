@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.codegen.targets import wasm_binary
+from lie_codegen.codegen.wasm import wasm_binary
 from lie_codegen.errors import InputError, MissingDependencyError
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.build import generate

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.phase_routine import Frozen, no_tangent
+from lie_codegen.averaging.phase_routine import no_tangent
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.elliptic import DEPTH, jacobi, ladder, phase, sn_cn_dn
@@ -69,8 +69,8 @@ def precession_routine() -> Routine:
         Kernel("precession_moduli", NAMESPACE, (Port("k", ()),), (below,), moduli),
         Kernel("precession_dn", NAMESPACE, (below, Port("phi", ())), (Port("dn", ()),), dn),
     )
-    cosines = [repr(math.cos(2 * math.pi * j / NODES)) for j in range(NODES)]
-    settings = (("nodes", NODES), ("terms", TERMS), ("cosines", Frozen(cosines)), ("depth", DEPTH),
+    cosines = tuple(repr(math.cos(2 * math.pi * j / NODES)) for j in range(NODES))
+    settings = (("nodes", NODES), ("terms", TERMS), ("cosines", cosines), ("depth", DEPTH),
                 ("moduli", helpers[0].symbol), ("dn", helpers[1].symbol))  # fmt: skip
 
     def twin(values: Sequence[float]) -> Array:

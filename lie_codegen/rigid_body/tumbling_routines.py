@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.phase_routine import Frozen, no_tangent
+from lie_codegen.averaging.phase_routine import no_tangent
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.elliptic import DEPTH, ladder, sn_cn_dn
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.kernel.routine import Routine
 from lie_codegen.rigid_body.plates import plate_force
 from lie_codegen.rigid_body.rotation_formulas import (
@@ -124,9 +125,9 @@ def average_routine(model: TorqueModel, namespace: str) -> Routine:
             )
         )
     plates = model.plates()
-    views = [{"numbers": [repr(v) for v in numbers], "place": place} for numbers, place in plates]
+    views = tuple(Definition(numbers=tuple(map(repr, numbers)), place=place) for numbers, place in plates)
     settings = (
-        ("key", model.key), ("depth", DEPTH), ("environment", model.size), ("plates", Frozen(views)), ("turns", model.turns), ("start", names["start"]), ("node", names["node"]),
+        ("key", model.key), ("depth", DEPTH), ("environment", model.size), ("plates", views), ("turns", model.turns), ("start", names["start"]), ("node", names["node"]),
         ("smooth", names["smooth"] if model.has_smooth else ""),
     )  # fmt: skip
 
@@ -186,9 +187,9 @@ def torus_routine(model: TorqueModel, namespace: str) -> Routine:
         series = torus_series(samples, float(rate), m, b)
         return np.append(series.correction(phi, hat), series.torque)
 
-    cosines = [repr(float(each)) for each in np.cos(2 * np.pi * np.arange(TORUS_NODES) / TORUS_NODES)]
+    cosines = tuple(repr(float(each)) for each in np.cos(2 * np.pi * np.arange(TORUS_NODES) / TORUS_NODES))
     settings = (
-        ("key", model.key), ("depth", DEPTH), ("environment", model.size), ("nodes", TORUS_NODES), ("terms", TERMS), ("cosines", Frozen(cosines)),
+        ("key", model.key), ("depth", DEPTH), ("environment", model.size), ("nodes", TORUS_NODES), ("terms", TERMS), ("cosines", cosines),
         ("smallest", repr(SMALLEST_DIVISOR)), ("start", helpers[0].symbol), ("node", helpers[1].symbol), ("sample", helpers[2].symbol),
     )  # fmt: skip
     return Routine(

@@ -12,8 +12,9 @@ from itertools import combinations
 from typing import Any
 
 from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.kept_forms import Form
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.maps.membership import Form, Membership, membership
+from lie_codegen.groups.maps.membership import Membership, membership
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex

@@ -22,32 +22,26 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lie_codegen.arrays import Array
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import defect, largest
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_guard import off_group_square
-from lie_codegen.groups.maps.log_iterations import matrix_log, rotation_log, unitary_log
-from lie_codegen.groups.maps.log_lattice import lattice_log
-from lie_codegen.groups.maps.log_structure import LogBlock
+from lie_codegen.groups.maps.log_in_numpy import RESIDUAL, SETTLED, NumpyLog
 from lie_codegen.groups.maps.logarithm import candidate
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
 from lie_codegen.groups.maps.rkmk import hat_body
-from lie_codegen.kernel.arithmetic import ROUNDOFF, Arithmetic, FloatArithmetic, Scalar, unit_roundoff
+from lie_codegen.kernel.arithmetic import ROUNDOFF, Arithmetic, Scalar, unit_roundoff
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matmul, matvec, total
+from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.kernel.routine import Routine, call_routine
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
-from lie_codegen.on_demand import scipy
 
 #: The defect up to which a closed form is taken as it is: rounding of the numbers that the kernel is printed for.
 _ROUNDING = {ROUNDOFF["double"]: 1e-13, ROUNDOFF["float"]: 4e-6}
-_STEPS = 3
-_RESIDUAL, _DISTANCE = 1e-12, 1e-5
-_SETTLED = 4e-15
+_DISTANCE = 1e-5
 
 
 class _Rounding(NamedTuple):
@@ -79,8 +73,8 @@ _DOUBLE = _Rounding(
     polar="1e-15",
     deflation="1.1e-16",
     singular="1e-13",
-    settled=repr(_SETTLED),
-    residual=repr(_RESIDUAL),
+    settled=repr(SETTLED),
+    residual=repr(RESIDUAL),
     kernel="1e-14",
     cluster="1e-6",
     tie="1e-9",
@@ -183,7 +177,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         helpers += _lattice_helpers(data, X, x)
     blocks, start = [], 0
     for block in structure.iterated:
-        blocks.append({"kind": block.kind, "indices": block.indices, "special": block.special, "start": start})
+        blocks.append(Definition(kind=block.kind, indices=block.indices, special=block.special, start=start))
         start += len(block.rows)
     settings = (
         ("definition", group.definition),
@@ -191,7 +185,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         ("dim", n),
         ("is_complex", group.is_complex),
         ("kinds", tuple(sorted({block.kind for block in structure.iterated}))),
-        ("blocks", _Frozen(blocks)),
+        ("blocks", tuple(blocks)),
         ("logs_size", size),
         ("distance", distance),
         ("rounding", _DOUBLE),
@@ -201,7 +195,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         ("lattice", not structure.is_onto),
         *((f"{each.name.removeprefix('log_')}_symbol", each.symbol) for each in helpers[2:]),
     )
-    twin = _Twin(data, first, second, distance)
+    twin = NumpyLog(data, first, second, distance)
     return Routine(
         f"{group.name}_log_checked" if distance == _DISTANCE else f"{group.name}_log_far",
         d * d * (2 if group.is_complex else 1),
@@ -243,13 +237,6 @@ def _lattice_helpers(data: GroupDerivation, X: Port, x: Port) -> list[Kernel]:
         Kernel("log_adjoint", group.name, (X,), (Port("Ad_X", (n, n)),), adjoint),
         Kernel("log_turned", group.name, (Port("y", (n,)), X), (Y,), turned),
     ]
-
-
-class _Frozen(tuple[Any, ...]):
-    """A list of records of plain data that can be a part of a key."""
-
-    def __hash__(self) -> int:
-        return hash(repr(tuple(self)))
 
 
 def vee(ops: Arithmetic, data: GroupDerivation, A: Sequence[Sequence[Any]]) -> Vector:
@@ -319,91 +306,3 @@ def _tangent(data: GroupDerivation) -> Any:
         return matvec(jacobian(ops, data, outputs, "right", inverse=True), velocity)
 
     return tangent
-
-
-class _Twin:
-    """The routine in NumPy."""
-
-    def __init__(self, data: GroupDerivation, first: Kernel, second: Kernel, distance: float) -> None:
-        self.data = data
-        self.distance = distance
-        self.first = first
-        self.second = second
-        self.ops = FloatArithmetic()
-
-    def __call__(self, values: Sequence[float]) -> Array:
-        group = self.data.group
-        flat = np.array(values, dtype=np.float64)
-        d = group.degree
-        X: NDArray[Any] = (flat[::2] + 1j * flat[1::2] if group.is_complex else flat).reshape(d, d)
-        nothing = np.full(group.dim, np.nan)
-        if not np.all(np.isfinite(flat)):
-            return nothing
-        with np.errstate(all="ignore"):
-            x = self._candidate(X)
-            if x is not None and self._certified(x, X):
-                return x
-            if self.data.log_structure.is_onto:
-                return nothing
-            try:
-                found = lattice_log(self.data.group, X, lambda x: self._certified(x, X))
-            except (ValueError, np.linalg.LinAlgError):
-                found = None
-        return nothing if found is None else found
-
-    def _candidate(self, X: NDArray[Any]) -> Array | None:
-        try:
-            logs = [value for block in self.data.log_structure.iterated for value in self._block(block, X)]
-            arguments = [logs] if logs else []
-            (x,) = self.first.evaluate(self.ops, self._scalars(X), *arguments)
-        except (ValueError, ZeroDivisionError, OverflowError, np.linalg.LinAlgError):
-            return None
-        return np.array([float(value) for value in x])
-
-    def _block(self, block: LogBlock, X: NDArray[Any]) -> list[float]:
-        part = X[np.ix_(block.indices, block.indices)]
-        if block.kind == "rotation":
-            A: NDArray[Any] = rotation_log(part)
-        else:
-            A = unitary_log(part, special=block.special) if block.kind == "unitary" else matrix_log(part)
-        if not self.data.group.is_complex:
-            return [float(value) for value in A.real.ravel()]
-        return [float(value) for value in A.ravel().view(np.float64)]
-
-    def _scalars(self, X: NDArray[Any]) -> list[list[Any]]:
-        if self.data.group.is_complex:
-            return [[Complex(float(z.real), float(z.imag)) for z in row] for row in X]
-        return [[float(entry) for entry in row] for row in X]
-
-    def _certified(self, x: Array, X: NDArray[Any]) -> bool:
-        """Newton's steps in place; whether x is then a logarithm."""
-        scalars = self._scalars(X)
-
-        def error(x: Array) -> tuple[Array, float, float]:
-            try:
-                u, (distance, kappa) = self.second.evaluate(self.ops, x.tolist(), scalars)
-            except (ValueError, ZeroDivisionError, OverflowError):
-                return np.full(len(x), np.nan), np.nan, np.nan
-            return np.array([float(value) for value in u]), float(distance), float(kappa)
-
-        u, distance, kappa = error(x)
-        for _ in range(_STEPS):
-            if np.max(np.abs(u)) <= _SETTLED * kappa:
-                break
-            y = x + np.linalg.solve(right_jacobian(self.data, x), u)
-            v, *fresh = error(y)
-            if not np.max(np.abs(v)) < np.max(np.abs(u)):
-                break
-            x[:] = y
-            u, (distance, kappa) = v, fresh
-        return bool(np.max(np.abs(u)) <= _RESIDUAL * kappa and distance <= self.distance * kappa)
-
-
-def right_jacobian(data: GroupDerivation, x: Array) -> Array:
-    """(1 - e^{-ad x})/ad x, from the exponential of [[-ad, 1], [0, 0]]."""
-    n = len(x)
-    both = np.zeros((2 * n, 2 * n))
-    for i, j, k, value in data.group.algebra.constants():
-        both[k, j] -= x[i] * float(value)
-    both[:n, n:] = np.eye(n)
-    return np.asarray(scipy.linalg.expm(both)[:n, n:])

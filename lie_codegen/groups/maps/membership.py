@@ -24,31 +24,9 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
+from lie_codegen.groups.maps.kept_forms import RANK, Form, as_vector, in_doubles, kept_forms, leading, rescaled
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.on_demand import sympy as sp
-
-#: Relative size of a singular value that counts as zero; the entries are exact numbers of moderate size.
-_RANK = 1e-9
-
-
-@dataclass(frozen=True)
-class Form:
-    """X* S X = S (chi(X) S where `semi`), X* the transpose or (`conjugate`) the adjoint; `dual`: X S X* in its place."""
-
-    matrix: sp.ImmutableMatrix
-    conjugate: bool = False
-    dual: bool = False
-    semi: bool = False
-
-    @property
-    def text(self) -> str:
-        """As a message names it."""
-        star = "X^H" if self.conjugate else "X^T"
-        left = f"X S {star}" if self.dual else f"{star} S X"
-        if self.matrix == sp.eye(self.matrix.rows):
-            left = left.replace(" S", "")
-        right = "chi S" if self.semi else "1" if self.matrix == sp.eye(self.matrix.rows) else "S"
-        return f"{left} - {right}"
 
 
 @dataclass(frozen=True)
@@ -75,7 +53,7 @@ class Membership:
 @lru_cache(maxsize=64)
 def membership(group: MatrixGroup) -> Membership:
     """The conditions of a group, as few as cut it out up to its components."""
-    generators = tuple(_rescaled(matrix) for matrix in group.exact_basis)
+    generators = tuple(rescaled(matrix) for matrix in group.exact_basis)
     tangent = _TangentSpace(group)
     linear = _annihilator(group, generators)
     tangent.add(_linear_rows(linear, tangent.width))
@@ -86,7 +64,7 @@ def membership(group: MatrixGroup) -> Membership:
     if alone:
         tangent.add(traces)
     forms: list[Form] = []
-    for form in () if tangent.complete else _forms(group, generators):
+    for form in () if tangent.complete else kept_forms(group, generators):
         if tangent.add(_form_rows(form, group)):
             forms.append(form)
         if tangent.complete:
@@ -126,15 +104,7 @@ class _TangentSpace:
         if not together.size:
             return self.rows
         _, values, directions = np.linalg.svd(together, full_matrices=False)
-        return np.asarray(directions[: int(np.sum(values > _RANK * max(values[0], 1e-300)))])
-
-
-def _rescaled(matrix: sp.MatrixBase) -> sp.ImmutableMatrix:
-    """A multiple of the matrix, with rational entries where there is one: what is asked depends on the span alone."""
-    parts = [part for part in real_coordinates(matrix) if part != 0]
-    scaled = (matrix / parts[0]).applyfunc(sp.radsimp) if not parts[0].is_Rational else matrix
-    rational = all(part.is_Rational for part in real_coordinates(scaled))
-    return sp.ImmutableMatrix(scaled if rational else matrix)
+        return np.asarray(directions[: int(np.sum(values > RANK * max(values[0], 1e-300)))])
 
 
 def _entries(matrix: sp.MatrixBase, is_complex: bool) -> list[Number]:
@@ -143,33 +113,23 @@ def _entries(matrix: sp.MatrixBase, is_complex: bool) -> list[Number]:
     return flat[::2] + flat[1::2] if is_complex else flat[::2]
 
 
-def _vector(matrix: Any, is_complex: bool) -> Array:
-    """The same in floating point."""
-    flat = np.asarray(matrix, dtype=complex).ravel()
-    return np.concatenate([flat.real, flat.imag]) if is_complex else flat.real
-
-
-def _numeric(matrices: Sequence[sp.MatrixBase]) -> list[NDArray[Any]]:
-    return [np.array(matrix.evalf(17).tolist(), dtype=complex) for matrix in matrices]
-
-
 def _annihilator(group: MatrixGroup, generators: Sequence[sp.ImmutableMatrix]) -> tuple[dict[int, Number], ...]:
     """Rows that vanish on every product of generators: X - 1 lies in the real span of these products.
 
     Which products are independent is decided in floating point, what annihilates them exactly.
     """
     width = group.degree**2 * (2 if group.is_complex else 1)
-    exact, numeric, rows = list(generators), _numeric(generators), np.zeros((0, width))
+    exact, numeric, rows = list(generators), in_doubles(generators), np.zeros((0, width))
     sides = numeric[:]
     chosen: list[sp.ImmutableMatrix] = []
     queue = list(zip(exact, numeric, strict=True))
     while queue and len(chosen) < width:
         matrix, value = queue.pop(0)
-        vector = _vector(value, group.is_complex)
+        vector = as_vector(value, group.is_complex)
         size = np.linalg.norm(vector)
         rest = vector - rows.T @ (rows @ vector)
         rest = rest - rows.T @ (rows @ rest)
-        if size == 0 or np.linalg.norm(rest) <= _RANK * size:
+        if size == 0 or np.linalg.norm(rest) <= RANK * size:
             continue
         rows = np.concatenate([rows, rest[None] / np.linalg.norm(rest)])
         chosen.append(matrix)
@@ -178,12 +138,7 @@ def _annihilator(group: MatrixGroup, generators: Sequence[sp.ImmutableMatrix]) -
         return ()
     table = [_entries(matrix.applyfunc(sp.expand), group.is_complex) for matrix in chosen]
     found = to_numbers(domain_matrix(table).nullspace().to_dense())
-    return tuple({k: sp.radsimp(value / _leading(row)) for k, value in enumerate(row) if value != 0} for row in found)
-
-
-def _leading(row: Sequence[Number]) -> Number:
-    """The entry of largest modulus: rows are scaled to it."""
-    return max(row, key=lambda value: abs(float(value)))
+    return tuple({k: sp.radsimp(value / leading(row)) for k, value in enumerate(row) if value != 0} for row in found)
 
 
 def blocks_suffice(group: MatrixGroup, *, scaled: bool) -> bool:
@@ -209,96 +164,6 @@ def _linear_rows(linear: Iterable[dict[int, Number]], width: int) -> Array:
     return rows.reshape(-1, width)
 
 
-def _forms(group: MatrixGroup, generators: Sequence[sp.ImmutableMatrix]) -> Iterable[Form]:
-    """Invariant forms, then dual ones, then those kept up to a factor."""
-    kinds = [(True, 1)] if group.is_complex else []
-    kinds += [(False, 1), (False, -1)]
-    for dual in (False, True):
-        for conjugate, sign in kinds:
-            for S in _invariant(group, generators, conjugate, sign, dual):
-                yield Form(S, conjugate, dual)
-    derived = _derived(group)
-    if not derived or len(derived) == group.dim:
-        return
-    for dual in (False, True):
-        for conjugate, sign in kinds:
-            for S in _invariant(group, derived, conjugate, sign, dual):
-                if all(_proportional(_action(A, S, conjugate, dual), S) for A in generators):
-                    yield Form(S, conjugate, dual, semi=True)
-
-
-def _derived(group: MatrixGroup) -> list[sp.ImmutableMatrix]:
-    """A basis of the matrices of [g, g]."""
-    rows = [[row.get(k, sp.S.Zero) for k in range(group.dim)] for row in group.algebra.table.values()]
-    if not rows:
-        return []
-    reduced, pivots = domain_matrix(rows).rref()
-    result = []
-    for row in to_numbers(reduced)[: len(pivots)]:
-        total = sp.zeros(group.degree, group.degree)
-        for value, matrix in zip(row, group.exact_basis, strict=True):
-            total += value * matrix
-        result.append(_rescaled(total.applyfunc(sp.expand)))
-    return result
-
-
-def _action(A: sp.MatrixBase, S: sp.MatrixBase, conjugate: bool, dual: bool) -> sp.MatrixBase:
-    star = A.H if conjugate else A.T
-    return (A * S + S * star if dual else star * S + S * A).applyfunc(sp.expand)
-
-
-def _proportional(B: sp.MatrixBase, S: sp.MatrixBase) -> bool:
-    place = next(k for k, value in enumerate(S.flat()) if value != 0)
-    factor = B.flat()[place] / S.flat()[place]
-    return bool((B - factor * S).applyfunc(lambda e: sp.radsimp(sp.expand(e))).is_zero_matrix)
-
-
-def _invariant(
-    group: MatrixGroup, generators: Sequence[sp.ImmutableMatrix], conjugate: bool, sign: int, dual: bool
-) -> list[sp.ImmutableMatrix]:
-    """A basis of the S = sign S^T (hermitian where `conjugate`) with A* S + S A = 0 for all generators."""
-    patterns = _patterns(group.degree, conjugate, sign, group.is_complex)
-    if not patterns:
-        return []
-    values, bases = _numeric(patterns), _numeric(generators)
-
-    def moved(A: NDArray[Any], S: NDArray[Any]) -> NDArray[Any]:
-        star = A.conj().T if conjugate else A.T
-        return np.asarray(A @ S + S @ star if dual else star @ S + S @ A)
-
-    columns = [np.concatenate([_vector(moved(A, S), True) for A in bases]) for S in values]
-    if np.linalg.matrix_rank(np.array(columns).T, tol=_RANK * max(1.0, float(np.max(np.abs(columns))))) == len(
-        patterns
-    ):
-        return []
-    table = [[part for A in generators for part in real_coordinates(_action(A, S, conjugate, dual))] for S in patterns]
-    equations = [list(row) for row in zip(*table, strict=True) if any(row)]
-    found = to_numbers(domain_matrix(equations).nullspace().to_dense()) if equations else sp.eye(len(patterns)).tolist()
-    result = []
-    for row in found:
-        total = sp.zeros(group.degree, group.degree)
-        for value, S in zip(row, patterns, strict=True):
-            total += value * S
-        flat = [part for part in real_coordinates(total.applyfunc(sp.expand)) if part != 0]
-        result.append(sp.ImmutableMatrix((total / _leading(flat)).applyfunc(lambda e: sp.radsimp(sp.expand(e)))))
-    return result
-
-
-def _patterns(d: int, conjugate: bool, sign: int, is_complex: bool) -> list[sp.ImmutableMatrix]:
-    """A real basis of the hermitian, symmetric or antisymmetric matrices."""
-    result = []
-    for i in range(d):
-        for j in range(i, d):
-            for factor in (sp.S.One, sp.I) if is_complex else (sp.S.One,):
-                S = sp.zeros(d, d)
-                S[i, j] += factor
-                S[j, i] = sp.conjugate(factor) if conjugate and i != j else sign * factor if i != j else S[i, j]
-                if i == j and ((conjugate and factor != 1) or (not conjugate and sign < 0)):
-                    continue
-                result.append(sp.ImmutableMatrix(S))
-    return result
-
-
 def _units(group: MatrixGroup) -> list[NDArray[Any]]:
     """A real basis of all matrices, in the order of the entries."""
     d = group.degree
@@ -308,12 +173,12 @@ def _units(group: MatrixGroup) -> list[NDArray[Any]]:
 
 def _rows_of(group: MatrixGroup, condition: Callable[[NDArray[Any]], NDArray[Any]]) -> Array:
     """The rows of a real-linear condition on Y."""
-    columns = [_vector(condition(E), True) for E in _units(group)]
+    columns = [as_vector(condition(E), True) for E in _units(group)]
     return np.array(columns).T
 
 
 def _form_rows(form: Form, group: MatrixGroup) -> Array:
-    S = _numeric([form.matrix])[0]
+    S = in_doubles([form.matrix])[0]
     square = float(np.sum(np.abs(S) ** 2))
 
     def condition(Y: NDArray[Any]) -> NDArray[Any]:
@@ -364,10 +229,10 @@ def _oriented(forms: Sequence[Form]) -> tuple[tuple[Form, tuple[tuple[float, ...
     """Indefinite real symmetric forms, with the eigenvectors of their positive eigenvalues."""
     result = []
     for form in forms:
-        S = _numeric([form.matrix])[0]
+        S = in_doubles([form.matrix])[0]
         if form.conjugate or np.any(S.imag) or not np.allclose(S, S.T):
             continue
         values, vectors = np.linalg.eigh(S.real)
-        if values[0] < -_RANK and values[-1] > _RANK:
-            result.append((form, tuple(map(tuple, vectors[:, values > _RANK].tolist()))))
+        if values[0] < -RANK and values[-1] > RANK:
+            result.append((form, tuple(map(tuple, vectors[:, values > RANK].tolist()))))
     return tuple(result)

@@ -19,9 +19,10 @@ from lie_codegen.exact.block_structure import diagonal_blocks
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.defect import determinant
 from lie_codegen.groups.maps.exponential import exp_matrix
+from lie_codegen.groups.maps.kept_forms import Form
 from lie_codegen.groups.maps.log_routine import far_log
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.maps.membership import Form, Membership, blocks_suffice, membership
+from lie_codegen.groups.maps.membership import Membership, blocks_suffice, membership
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import (

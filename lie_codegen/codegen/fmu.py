@@ -1,0 +1,168 @@
+"""The package as a unit of FMI 3.0: its description, its C around the functions, and the packed .fmu."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import sysconfig
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lie_codegen.codegen.fmu_loop import loop_unit
+from lie_codegen.codegen.target_functions import (
+    PortView,
+    c_sources,
+    functions_of,
+    run_compiler,
+)
+from lie_codegen.codegen.templates import render
+
+
+def fmu_files(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dict[str, str]:
+    """The files of the unit: the steps p -> p_next of the package, or all its functions where it has none."""
+    functions = functions_of(manifest, tree)
+    if manifest.get("schedule"):
+        variables, unit, at = loop_unit(manifest["schedule"], functions, _variable)
+        return _unit_files(manifest, tree, variables, [], at, unit)
+    steps = [each for each in functions if each.is_step]
+    shown = steps or functions
+    variables = []
+    calls = []
+    at = 0
+    for function in shown:
+        prefix = f"{function.name}." if len(shown) > 1 else ""
+        states = (
+            {p.name.removesuffix("_next") for p in function.outputs if p.name.endswith("_next")}
+            if function.is_step
+            else set()
+        )
+        places: dict[str, int] = {}
+        inputs, outputs = [], []
+        for port in function.inputs:
+            role = (
+                "step"
+                if function.is_step and port.name == "h" and port.size == 1
+                else "time"
+                if function.is_step and port.name == "t" and port.size == 1
+                else ""
+            )
+            if not role:
+                state, tuned = port.name in states, port.name in function.tunable
+                places[port.name] = at
+                variables.append(
+                    _variable(
+                        f"{prefix}{port.name}",
+                        len(variables) + 1,
+                        port,
+                        at,
+                        function.start.get(port.name),
+                        "output" if state else "parameter" if tuned else "input",
+                    )
+                )
+                at += port.size
+            inputs.append({"role": role, "c": f"c_{port.name}", "at": places.get(port.name, 0), "scalar": port.scalar})
+        for port in function.outputs:
+            old = port.name.removesuffix("_next")
+            if function.is_step and port.name.endswith("_next") and old in places:
+                outputs.append({"role": "next", "c": f"c_{port.name}", "at": places[old], "size": port.size})
+                continue
+            variables.append(_variable(f"{prefix}{port.name}", len(variables) + 1, port, at, None, "output"))
+            outputs.append({"role": "", "c": "", "at": at, "size": port.size})
+            at += port.size
+        calls.append({"symbol": function.symbol, "is_step": function.is_step, "inputs": inputs, "outputs": outputs})
+    return _unit_files(manifest, tree, variables, calls, at, None)
+
+
+def _unit_files(
+    manifest: Mapping[str, Any],
+    tree: Mapping[str, str],
+    variables: Sequence[dict[str, Any]],
+    calls: Sequence[dict[str, Any]],
+    total: int,
+    unit: dict[str, Any] | None,
+) -> dict[str, str]:
+    """The description of the unit and its C."""
+    token = "{" + hashlib.sha256(tree["manifest.json"].encode()).hexdigest()[:32] + "}"
+    names = {
+        "namespace": manifest["namespace"], "version": manifest["version"], "token": token, "variables": variables, "functions": calls,
+        "total": total, "unit": unit, "sources": ["fmi3.c", *(Path(path).name for path in c_sources(tree))],
+    }  # fmt: skip
+    return {
+        "fmu/modelDescription.xml": render("fmi3_modelDescription.xml.jinja", **names),
+        "fmu/buildDescription.xml": render("fmi3_buildDescription.xml.jinja", **names),
+        "fmu/fmi3.c": render("fmi3.c.jinja", **names),
+    }
+
+
+def _variable(
+    name: str, reference: int, port: PortView, at: int, start: list[str] | None, causality: str
+) -> dict[str, Any]:
+    values = start if start is not None else ["0"] * port.size
+    state = causality == "output" and start is not None
+    initial = "exact" if state or causality == "parameter" else "calculated" if causality == "output" else ""
+    return {
+        "name": name, "reference": reference, "causality": causality, "initial": initial, "shape": port.shape, "at": at,
+        "variability": "tunable" if causality == "parameter" else "continuous", "description": port.said,
+        "start": values if initial != "calculated" else None, "first": values, "computed": initial == "calculated",
+    }  # fmt: skip
+
+
+def pack_fmu(folder: Path, compilers: Sequence[Sequence[str]]) -> Path:
+    """Compile the unit for this machine and pack <namespace>.fmu in the folder: description, sources, and the library where there
+    is a compiler. Returns its path, which the manifest lists.
+
+    Raises:
+        CompileError: the compiler's own words.
+    """
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    namespace = manifest["namespace"]
+    path = folder / f"{namespace}.fmu"
+    with tempfile.TemporaryDirectory() as name, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+
+        def add(place: str, content: bytes) -> None:
+            # a fixed date: the same package is the same file
+            packed.writestr(zipfile.ZipInfo(place, (1980, 1, 1, 0, 0, 0)), content)
+
+        add("modelDescription.xml", (folder / "fmu" / "modelDescription.xml").read_bytes())
+        add("sources/buildDescription.xml", (folder / "fmu" / "buildDescription.xml").read_bytes())
+        sources = [folder / "fmu" / "fmi3.c", *sorted((folder / "src").glob("*.c"))]
+        for source in sources:
+            add(f"sources/{source.name}", source.read_bytes())
+        for header in sorted((folder / "include").glob("*.h")):
+            add(f"sources/include/{header.name}", header.read_bytes())
+        if compilers:
+            place, ending = _platform()
+            library = Path(name) / f"{namespace}{ending}"
+            maths = [] if os.name == "nt" else ["-lm"]
+            run_compiler(
+                [
+                    *compilers[0],
+                    "-O2",
+                    "-std=c99",
+                    "-shared",
+                    "-fPIC",
+                    f"-I{folder / 'include'}",
+                    *map(str, sources),
+                    "-o",
+                    str(library),
+                    *maths,
+                ]
+            )
+            add(f"binaries/{place}/{library.name}", library.read_bytes())
+    manifest["files"][path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    return path
+
+
+def _platform() -> tuple[str, str]:
+    """The name of this machine in FMI 3.0, and the ending of its libraries."""
+    machine = sysconfig.get_platform().rsplit("-", 1)[-1].lower()
+    word = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+    if sys.platform.startswith("win"):
+        return f"{word}-windows", ".dll"
+    return (f"{word}-darwin", ".dylib") if sys.platform == "darwin" else (f"{word}-linux", ".so")
