@@ -63,6 +63,8 @@ class _Maker:
 
     def square(self) -> Network:
         """Swaps bit after bit of the row index with that of the column index."""
+        # A transposition exchanges row and column index, and so does exchanging their bits one after the other: for bit b the entry
+        # (row without b, column with b) goes to (row with b, column without b). Each takes one shuffle a vector: log2(L) in all.
         names = [f"a{k}" for k in range(self._lanes)]
         bit = 1
         while bit < self._lanes:
@@ -86,9 +88,11 @@ class _Maker:
         if size == 1:
             return flat
         if size % 2 == 0:
+            # The elements at even places of two neighbours are the records' even entries: records of half the size, twice.
             pairs = list(zip(flat[::2], flat[1::2], strict=True))
             halves = [self._apart([self._mix(a, b, range(k, 2 * lanes, 2)) for a, b in pairs]) for k in (0, 1)]
             return [name for pair in zip(*halves, strict=True) for name in pair]
+        # Odd records do not halve; entry e of the record of lane k stands at e + size k of the whole run.
         return [
             self._collect(flat, [divmod(entry + size * lane, lanes) for lane in range(lanes)]) for entry in range(size)
         ]
@@ -117,6 +121,7 @@ class _Maker:
         used = sorted({source for source, _ in wanted})
         first, *others = used
         name, done = sources[first], {first}
+        # One source after another is mixed in; lanes whose source is yet to come hold anything meanwhile.
         picks = [place if source == first else 0 for source, place in wanted]
         for other in others:
             merged = [

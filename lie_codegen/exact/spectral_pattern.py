@@ -93,9 +93,11 @@ class _Family:
         if not self.known:
             return None
         krylov = [self._krylov(p, j) for p in range(_POINTS)]
+        # e_j on which the family acts nilpotently needs no form at all: A^k e_j = 0.
         for zeros in range(1, self.size + 1):
             if all(not k[zeros] for k in krylov):
                 return ColumnPattern(zeros, 0, None, self._supports(krylov, (0,) * _POINTS, zeros, 0))
+        # The shortest polynomial first: a pair costs two products with A in every kernel, a zero one.
         rows = self._reach(j)
         for pairs in range(1, _MOST_PAIRS + 1):
             for zeros in range(_MOST_ZEROS + 1):
@@ -117,6 +119,7 @@ class _Family:
         return vectors
 
     def _value(self, krylov: list[_Vector], q: int, power: int, pairs: int) -> _Vector:
+        # (A^2 + q)^m = sum_s binomial(m, s) q^(m - s) A^(2 s), on vectors A^i e_j that are there already.
         total: _Vector = {}
         for s in range(pairs + 1):
             weight = comb(pairs, s) * pow(q, pairs - s, self.prime)
@@ -132,12 +135,14 @@ class _Family:
         return tuple(
             (
                 (power, s),
+                # a row that vanishes at one point only does so by chance: it counts if it is there at any
                 frozenset(r for k, value in zip(krylov, q, strict=True) for r in self._value(k, value, power, s)),
             )
             for power, s in wanted
         )
 
     def _reach(self, j: int) -> frozenset[int]:
+        # The smallest set of rows that no A_i leads out of: e_j and all its images live there, so the trace is taken there.
         reached, new = {j}, [j]
         while new:
             column = new.pop()
@@ -154,6 +159,7 @@ class _Family:
             for columns in self.columns:
                 total = sum(a * columns[r].get(c, 0) for c in rows for r, a in columns[c].items() if r in rows)
                 traces.append(total % self.prime)
+            # r pairs +-sqrt(-q) and zeros have tr A^2 = -2 r q: for every r there is one candidate for q.
             shares = [pow(-2 * r, -1, self.prime) for r in range(1, len(rows) // 2 + 1)] if any(traces) else []
             self.forms[rows] = [tuple(t * share % self.prime for t in traces) for share in shares]
         return self.forms[rows]

@@ -138,6 +138,7 @@ def driven_loop(
 
     def some(first: int, last: int) -> None:
         fixed = spans.knots is not None and plan.count == 1 and not any(step for _, step in plan.strides)
+        # Ctrl-C is heard between two calls of C: a long run is cut where that changes no number, one trajectory from knot to knot.
         size = max(1, CALLS // spans.parts)
         if not fixed or spans.count <= size:
             moves.append(loop(compiled, plan, u, spans, first, last, found))
@@ -241,6 +242,7 @@ def _c_loop(compiled: Step, plan: _Plan, u: FormulaInput, spans: Spans, first: i
     batch = compiled.backend.loop_address(many=True) if count > 1 else 0
     at, point = np.ascontiguousarray(plan.at), np.array(plan.point, dtype=np.intp)
     lane, step = (np.array([pair[side] for pair in plan.strides], dtype=np.intp) for side in (0, 1))
+    # Every input of trajectory `first` on: 8 bytes a double, its stride from one trajectory to the next.
     pointers = np.array(
         [array.ctypes.data + 8 * first * stride for array, (stride, _) in zip(plan.arrays, plan.strides, strict=True)],
         dtype=np.uintp,
@@ -287,6 +289,7 @@ def _numpy_loop(
 ) -> float:
     """The same without the driver: u by numpy, block by block."""
     total, largest = spans.count * spans.parts, 0.0
+    # whole spans a block, so that the states asked for fall on its ends
     block = _SLOW_BLOCK // spans.parts * spans.parts or spans.parts
     mine = [a if lane == 0 else a[first:last] for a, (lane, _) in zip(plan.arrays, plan.strides, strict=True)]
     own = u.trajectories is not None

@@ -185,6 +185,7 @@ class Reader:
                 result = self._product(result, factor)
             return result
         if isinstance(node, sp.Pow) and node.exp.is_Integer and node.exp > 0:
+            # one factor after another: a product with the short base is cheaper than that of two long powers
             base = self.read(node.base)
             result = base
             for _ in range(int(node.exp) - 1):
@@ -203,12 +204,15 @@ class Reader:
         return trig.clean(total), common
 
     def _product(self, x: tuple[trig.Wave, int], y: tuple[trig.Wave, int]) -> tuple[trig.Wave, int]:
+        # cos a cos b = (cos(a + b) + cos(a - b))/2: twice the product has integer coefficients, the 2 goes to the denominator.
         total: trig.Wave = {}
         self.meter.spend(trig.products(x[0], y[0]))
         trig.add_twice_product(total, x[0], y[0], 1, self.ring.multiply)
         return trig.clean(total), 2 * x[1] * y[1]
 
     def _harmonic(self, node: sp.Expr) -> tuple[trig.Wave, int]:
+        # angle = frequency tau + sum multiple unit + turns pi: the first two are the key, the last is put in by the sum formula,
+        # for its sine and cosine are exact numbers: cos(key + turn) = cos turn cos key - sin turn sin key.
         rate, turns, phases = split_angle(node.args[0], self.time)
         frequency = int(sp.cancel(rate / self.omega))
         multiples = [0] * len(self.position)

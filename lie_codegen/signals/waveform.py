@@ -104,6 +104,7 @@ class TrigWaveform:
 
     def calculus(self, brackets: Brackets, dim: int) -> tuple[TrigCalculus, TrigSignal]:
         """The ring grows by the irrational structure constants."""
+        # sqrt(3) as a structure constant is a generator that no amplitude need have; with none the coefficients stay plain integers.
         constants = [value for row in brackets.values() for value in row.values()]
         ring = CoefficientRing.holding([*self.form.ring.generators, *constants])
         if ring.generators == self.form.ring.generators:
@@ -195,6 +196,7 @@ class SampledWaveform:
         return SampledCalculus(brackets, self.panels, dim), self.values
 
     def expressions(self, calculus: SampledCalculus, signal: Array, dim: int, time: sp.Expr) -> sp.ImmutableMatrix:
+        # A mean is such a signal: its values are one number up to the rounding of the quadrature.
         first = signal[0, 0]
         if np.max(np.abs(signal - first)) > 1e-12 * max(1.0, float(np.max(np.abs(signal)))):
             raise InputError("a sampled input has no exact expression in t; evaluate it instead")

@@ -93,6 +93,7 @@ class LogStructure:
     def order(self) -> tuple[int, ...]:
         """Basis elements, those with block-diagonal matrices first."""
         blocks = diagonal_blocks(self.group.exact_basis)
+        # With these first the pivots are found among them where they can be: the section is then block-diagonal, as its exponential.
         split = [is_block_diagonal(matrix, blocks) for matrix in self.group.exact_basis]
         return tuple(sorted(range(self.group.dim), key=lambda i: not split[i]))
 
@@ -140,6 +141,8 @@ class LogStructure:
         """Corrections that find the rest of x: each doubles the depth in the lower central series of ker T."""
         if len(self.pivots) == self.group.dim:
             return 0
+        # x = section + rest, the rest in ker T, a nilpotent ideal. exp(-section) X = exp(rest) up to brackets of the two: taken
+        # off, the error lies as deep again in the lower central series, so that log2 of its length many corrections do.
         if not self.pivots:
             return 1
         return nilpotency_class(self.group.algebra, self._kernel()).bit_length()

@@ -42,6 +42,7 @@ class QuotientRing:
 
     def shifted(self, a: Element) -> Element:
         """t a."""
+        # t t^(r-1) = t^r = -(c_0 + .. + c_(r-1) t^(r-1)): what leaves at the top comes back as a multiple of p.
         top = a[-1]
         low = [0, *a[:-1]]
         return [add(x, product(-1, product(c, top))) for x, c in zip(low, self.p, strict=True)]
@@ -55,6 +56,7 @@ class QuotientRing:
 
     def inverse(self, a: Element) -> Element:
         """1 / a: the first column of the inverse of the multiplication by a."""
+        # Multiplication by a is a matrix whose column k is a t^k. It takes 1/a to 1 = (1, 0, .., 0).
         columns = [a]
         while len(columns) < self.r:
             columns.append(self.shifted(columns[-1]))
@@ -90,6 +92,7 @@ class QuotientRing:
         """The principal root: in closed form for r = 2 over the reals, else by the Denman-Beavers product form."""
         if self.r == 2 and not any(isinstance(value, Complex) for value in (*a, *self.p)):
             return self._square_root_2(a)
+        # M -> 1 and Y -> sqrt(a) quadratically: Y^2 = a M all the way, with one inverse a step (Denman and Beavers).
         half, quarter = self.ops.constant(Fraction(1, 2)), self.ops.constant(Fraction(1, 4))
         M, Y = a, a
         for step in range(steps):
@@ -104,6 +107,8 @@ class QuotientRing:
 
     def _square_root_2(self, a: Element) -> Element:
         """(a + sqrt(det a)) / sqrt(tr a + 2 sqrt(det a)), with trace and determinant of the multiplication by a."""
+        # s = sqrt(a) as a 2 x 2 matrix: s^2 - (tr s) s + det s = 0 by Cayley and Hamilton, so s = (a + det s)/tr s, where
+        # det s = sqrt(det a) and (tr s)^2 = tr s^2 + 2 det s = tr a + 2 det s.
         other = self.shifted(a)
         determinant = a[0] * other[1] - a[1] * other[0]
         root = self.ops.sqrt(determinant)
@@ -115,6 +120,8 @@ def matrix_value(
     ops: Arithmetic, element: Element, powers: Sequence[Matrix], relation: Relation | None = None
 ) -> Matrix:
     """sum_i element[i] B^i from I, B, .., B^b: Horner's rule in B^b, whose products obey the relation (sign 1)."""
+    # b powers are there: the sum is cut into chunks of b terms, which share them, and only every b-th power costs a
+    # product (Paterson and Stockmeyer).
     block = len(powers) - 1
     chunks = [element[start : start + block] for start in range(0, len(element), block)]
     if len(chunks) > 1 and len(chunks[-1]) == 1:
@@ -146,7 +153,7 @@ def related_product(ops: Arithmetic, a: Matrix, b: Matrix, sign: int, relation: 
             continue
         other, factor = relation.get(place, (place, 1))
         if other == place and sign * factor == -1 and place in relation:
-            known[place] = 0
+            known[place] = 0  # an entry that is minus itself
             continue
         value: Scalar = 0
         for x, y in zip(a[place[0]], columns[place[1]], strict=True):
@@ -172,6 +179,7 @@ def power_sums(powers: Sequence[Matrix], count: int) -> list[Scalar]:
     eye = identity(len(powers[1]))
     sums = []
     for k in range(1, count + 1):
+        # tr B^k from B^top and B^(k - top): the trace of a product costs d^2, the product d^3
         first = min(k, top)
         sums.append(trace_of_product(powers[first], powers[k - first] if k > first else eye))
     return sums

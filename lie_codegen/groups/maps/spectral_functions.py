@@ -24,9 +24,13 @@ from lie_codegen.kernel.cotangent import four_pi_squared, taylor
 from lie_codegen.kernel.linear import Matrix, identity, matadd
 from lie_codegen.kernel.structural_zeros import add, product
 
+#: Eigenvalues up to 10 are brought below 10/16 = 0.63, where the next term of every series is below a rounding error:
+#: 0.63^16/16! = 3e-17 and 0.63^22/22! = 3e-26. More halvings would cost bits in the doublings, fewer would cost terms.
 _HALVINGS = 4
 _EVEN_TERMS = 11
 _EXP_TERMS = 16
+#: (t/2) coth(t/2) has poles at t = 2 pi i k. With the nearest three taken out the rest is analytic up to |t| = 8 pi, and its series
+#: in t^2 falls by (10/(8 pi))^2 = 0.16 a term: 0.16^18 = 5e-15.
 _POLES = 3
 _REMAINDER_TERMS = 18
 
@@ -44,7 +48,7 @@ def exponential(
         odd = related_product(ops, A, matrix_value(ops, sinh, powers, relation), -1, relation)
         return matadd(matrix_value(ops, cosh, powers, relation), odd)
     if unitary:
-        # A = i H: cosine and sine of H have real coefficients.
+        # A = i H: cosine and sine of the hermitian H have real coefficients, half the work of complex ones.
         H = [[_times_i(entry, -1) for entry in row] for row in A]
         ring, powers = _plain_ring(ops, H, traceless=traceless, real=True)
         V, S = _half_scale(ring, step=1, sign=-1)

@@ -51,8 +51,11 @@ def pose(task: Task, asked: Options) -> tuple[Structure, Numbers]:
     second = _dynamics(task, asked, shift)
     if asked.periodic and second is not None and np.any(second.ends[0] != second.ends[1]):
         raise SteeringInputError(f"{where}: a periodic manoeuvre ends with the velocity it starts with")
+    # In units of the duration D the manoeuvre lasts 1: velocities are multiplied by D, torques by D^2, and rates of either once
+    # more. The solver then sees numbers of order one whatever the task's clock.
     unit = D if second is None else D * D
     named = [(each, f"obstacle {number} ({type(each).__name__})") for number, each in enumerate(checked, start=1)]
+    # Cones first: the constraints of a stage are numbered so, and the sort keeps the user's order otherwise.
     named.sort(key=lambda pair: not isinstance(pair[0], Cone))
     structure = Structure(
         group,

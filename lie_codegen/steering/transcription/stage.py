@@ -138,12 +138,16 @@ def _curvature(
         A, B = group.basis[i], group.basis[j]
         if np.any(both := (A @ B + B @ A) / 2):
             twice[i, j] = twice[j, i] = ca.dot(lam, pushed(group, moved, both))
+    # log(exp(-Theta) exp(Theta + d)) = J d + [d, [Theta, d]]/12 + ...: weights on the bracket are a quadratic form in d, which the
+    # sum with its transpose below makes symmetric. Brackets with more Thetas are left out: the gradient, which decides where
+    # the solver ends, has no such error, and a step with a Hessian that is slightly off is only slightly longer or shorter.
     bent = wedge(group, weights) @ ad
     # The curvature of Theta itself, weighted by its gradient; that is held fixed, for its own change is in the other terms.
     fixed = ca.SX.sym("fixed", group.dim)
     q = at.w[size:]
     second = ca.substitute(ca.hessian(ca.dot(fixed, theta), q)[0], fixed, pulled)
     qq = K.T @ twice @ K + T.T @ ((bent + bent.T) / 12) @ T + second
+    # X_next is linear in the entries of X: no second derivative there, and the mixed one is that of the carried columns.
     dual = ca.horzcat(*[carried.T @ (push(group, A)[0].T @ lam) for A in group.basis])
     Xq = dual @ K
     width = structure.width
