@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def bench(
     what: Annotated[
-        str, typer.Argument(help='"" for everything that is timed, "steering", "control", "propagate".')
+        str, typer.Argument(help='"" for everything that is timed, "steering", "control", "engines", "propagate".')
     ] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
     only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
@@ -34,12 +34,15 @@ def bench(
     if what == "control":
         _control(json)
         return
+    if what == "engines":
+        _engines(only, json)
+        return
     if what == "propagate":
         _propagate(json)
         return
     if what:
         raise InputError(
-            f'bench: nothing is called {what!r}; there are "steering", "control", "propagate", or nothing for the rest'
+            f'bench: nothing is called {what!r}; there are "steering", "control", "engines", "propagate", or nothing for the rest'
         )
     from lie_codegen.benchmarks.run import bench as measure
 
@@ -64,6 +67,17 @@ def _control(json: bool) -> None:
         rows, missed = bench_control(say=report)
     emit(table(rows, missed), {"rows": [asdict(row) for row in rows], "missed": missed}, json)
     if missed:
+        raise typer.Exit(1)
+
+
+def _engines(only: str, json: bool) -> None:
+    from lie_codegen.benchmarks.engines import bench_engines, missed, table
+
+    with progress("bench engines") as report:
+        rows = bench_engines(only=only, say=report)
+    misses = missed(rows)
+    emit(table(rows, misses), {"rows": [asdict(row) for row in rows], "missed": misses}, json)
+    if misses:
         raise typer.Exit(1)
 
 
