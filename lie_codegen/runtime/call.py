@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Mapping
 from contextlib import nullcontext
+from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -22,8 +24,11 @@ if TYPE_CHECKING:
     import inspect
 
     from lie_codegen.kernel.kernel import Kernel
+    from lie_codegen.runtime.varying import Varying
 
 
+#: What compiles the entries that vary: it stands on what builds libraries, and so above this file; loaded when they are first asked for.
+VARYING = "lie_codegen.runtime.varying_build"
 #: What a call gives: an array, a number, or a named tuple.
 Result = TypeVar("Result")
 
@@ -90,12 +95,14 @@ class Compiled(Generic[Result]):
         result: Result = self._wrap(outputs, out, scalars=True)
         return result
 
-    def batch(self, *args: Any, out: Any = None, threads: int = 1, **named: Any) -> Any:
+    def batch(self, *args: Any, out: Any = None, threads: int = 1, layout: str = "whole", **named: Any) -> Any:
         """Evaluate N times: an input has a leading axis of length N, or is the same for all.
 
         Args:
             *args, out, **named: as for a call, with the leading axis.
             threads: over which the samples are shared out.
+            layout: "varying" for (N, m): the entries that are not the same for all inputs alone, in C order, as the twelve of a
+                rigid motion; less is written, which is what large batches wait for. `varying` and `whole` say where they belong.
 
         Returns:
             (N, *shape), or a named tuple of such arrays. Each sample as a call, to the accuracy of the lane mathematics:
@@ -104,7 +111,12 @@ class Compiled(Generic[Result]):
 
         Raises:
             ShapeError: as for a call; or no input has the leading axis, or two lengths differ.
+            InputError: another layout.
         """
+        if layout == "varying":
+            return self._varying.function.batch(*args, out=out, threads=threads, **named)
+        if layout != "whole":
+            raise InputError(f'{self.name}.batch: layout is "whole" or "varying", given {layout!r}')
         values = bind(self.signature, args, named)
         arrays, strides, count = sequences(self.signature, values, "samples", self.inputs)
         if count is None:
@@ -120,6 +132,26 @@ class Compiled(Generic[Result]):
         with progress("batch") if count > CALLS else nullcontext():
             in_parts(some, count, threads)
         return self._wrap(outputs, out, scalars=False)
+
+    @cached_property
+    def _varying(self) -> Varying:
+        made: Varying = import_module(VARYING).varying_of(self.kernel)
+        return made
+
+    @property
+    def varying(self) -> Any:
+        """Where the entries of the layout "varying" belong, as `numpy.nonzero` gives places: X[(..., *f.varying)]."""
+        found = self._varying.index
+        return found[0] if self.result_type is None else self.result_type(*found)
+
+    def whole(self, values: Any) -> Any:
+        """Results of the layout "varying", (..., m), with the entries that never vary put in: (..., *shape).
+
+        Raises:
+            ShapeError: the last axis does not hold m entries.
+        """
+        found = self._varying.whole([values] if self.result_type is None else list(values))
+        return found[0] if self.result_type is None else self.result_type(*found)
 
     def scan(self, *args: Any, n: int, every: int = 1, out: Any = None, **named: Any) -> Array:
         """The loop state <- f(state, ...), n times, in C; the state is the first input and the first output.
