@@ -99,7 +99,7 @@ def loop_arguments(
             sample = period if sample is None else sample
     read, watching = read_law(law), read_law(observer, observer=True)
     read = _ordered(read, order)
-    plant = _plant(group, read, inertia) if designed is None else designed
+    plant = _plant(group, read, inertia, gains) if designed is None else designed
     for port in (each for law in (read, watching) if law is not None for each in law.numbers):
         if port.name not in (gains or {}) and (port.name != "inertia" or inertia is None):
             raise InputError(
@@ -161,11 +161,12 @@ def _ordered(law: LoopLaw | None, order: int | None) -> LoopLaw | None:
     return replace(law, told=int(order))
 
 
-def _plant(group: Any, law: LoopLaw | None, inertia: Any) -> Plant:
+def _plant(group: Any, law: LoopLaw | None, inertia: Any, gains: Mapping[str, Any] | None) -> Plant:
     if hasattr(group, "loop_plant"):
         made: Plant = group.loop_plant(inertia=inertia)
         return made
-    other = named_plant(group, None if law is None else law.kernel, inertia, None if law is None else law.order)
+    kernel, order = (None, None) if law is None else (law.kernel, law.order)
+    other = named_plant(group, kernel, inertia, order, gains)
     if other is not None:
         return other
     if group is None:

@@ -243,8 +243,16 @@ def lagrangian_plant(system: LagrangianSystem) -> SpacePlant:
     return SpacePlant("_".join(("system", *system.coordinates)), n, len(columns), 2, acceleration)
 
 
-def named_plant(group: Any, law: Kernel | None, inertia: Any, order: int | None) -> Plant | None:
-    """The plant of what is no group: a sphere "s2", a Lagrangian system, or the mechanism of a manipulator's law; else None."""
+def named_plant(
+    group: Any, law: Kernel | None, inertia: Any, order: int | None, gains: Mapping[str, Any] | None = None
+) -> Plant | None:
+    """The plant of what is no group: a sphere "s2", a Lagrangian system, or the mechanism of a manipulator's law; else None.
+
+    Numbers of the mechanism that are inputs of its law are those of `gains`.
+
+    Raises:
+        InputError: such a number is not given, or is another in each of many loops.
+    """
     if isinstance(group, LagrangianSystem):
         return lagrangian_plant(group)
     definition = None if law is None else law.definition
@@ -256,9 +264,24 @@ def named_plant(group: Any, law: Kernel | None, inertia: Any, order: int | None)
     if kind == "manipulator_law" and definition is not None and (group is None or group == law.namespace):  # type: ignore[union-attr]
         told = definition["parameters"]
         rows = told["inertia"] if inertia is None else inertia
-        made = mechanism_plant(rows, told["potential"], told["parameters"], name=told["name"])
+        numbers = _mechanism_numbers(told["parameters"], gains or {})
+        made = mechanism_plant(rows, told["potential"], numbers, name=told["name"])
         return made
     return None
+
+
+def _mechanism_numbers(told: Mapping[str, Any] | None, gains: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters of a mechanism, those that the law takes as inputs from the numbers that it is given."""
+    numbers = dict(told or {})
+    for name in [name for name, value in numbers.items() if value == "input"]:
+        given = gains.get(name)
+        if given is None or np.ndim(given) != 0:
+            raise InputError(
+                f"closed_loop: {name} of the mechanism is an input of its law: give one number, gains={{{name!r}: ...}}; many loops of "
+                "other mechanisms are run one by one"
+            )
+        numbers[name] = float(given)
+    return numbers
 
 
 def sphere_dimension(name: Any) -> int | None:
