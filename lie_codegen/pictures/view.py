@@ -190,7 +190,7 @@ def _of_loop(run: ClosedLoop, group: Any, samples: int) -> Scene:
     else:
         curves.append(distance_curve(group, X, np.eye(group.degree), "distance to the identity"))
     facts = [("integration steps", str(run.steps)), ("end", f"{run.t[-1]:.6g} s")]
-    words = f"one of {run.X.shape[1]} runs" if many else "a closed loop"
+    words = f"one of {run.X.shape[1]} runs" if many else f"{len(run.t)} times of one run"
     return Scene(f"{group.name}: a closed loop", words, run.t, motions, curves[:5], facts, names)
 
 

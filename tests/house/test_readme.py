@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,15 @@ def test_the_python_of_the_readme_runs(repository: Path, tmp_path: Path) -> None
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "results" / "so3" / "manifest.json").is_file()
+    if shutil.which("cc") is None:
+        return
+    [program] = blocks(repository, "c")
+    (tmp_path / "main.c").write_text(program)
+    said = re.search(r"`(cc -std=c99 -Iresults/slew[^`]*)`", (repository / "README.md").read_text(encoding="utf-8"))
+    assert said is not None
+    printed = subprocess.run(said[1], shell=True, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    u1, u2 = map(float, printed.split())
+    assert 0 < u1**2 + u2**2 <= 2 * 0.4**2
 
 
 def test_the_group_file_of_the_readme_is_a_group(repository: Path, tmp_path: Path) -> None:
