@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.near_identity import GOOD
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.elliptic import LARGEST_MODULUS
 from lie_codegen.rigid_body.euler_second_order import MARGIN, EulerSolution, MeanMotion
-from lie_codegen.rigid_body.free_rigid_body import SlowState
+from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, SlowState
 from lie_codegen.rigid_body.phase_as_time import third_order_motion
+from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
 
-if TYPE_CHECKING:
-    from lie_codegen.rigid_body.euler_average import EulerAverage
+
+class AveragedEuler(Protocol):
+    """What a motion needs of lc.euler_average: its body, its kernels, and the map between mean and osculating variables."""
+
+    @property
+    def body(self) -> FreeRigidBody: ...
+    @property
+    def second_order_library(self) -> Library: ...
+    @property
+    def third_order_library(self) -> Library: ...
+    def mean_point(self, Omega: float, k: float, phi: float, eps: float, tau: float) -> tuple[SlowState, str]: ...
+    def stacked(self, *columns: ArrayLike) -> Array: ...
+    def to_osculating(
+        self, Omega: ArrayLike, k: ArrayLike, phi: ArrayLike, eps: float, tau: ArrayLike
+    ) -> SlowState: ...
 
 
 def averaged_motion(
-    flow: EulerAverage, omega0: Array, t: Array, eps: float, order: int, start: str, rtol: float
+    flow: AveragedEuler, omega0: Array, t: Array, eps: float, order: int, start: str, rtol: float
 ) -> EulerSolution:
     """The motion from omega0 (3,) at t[0], whose axes are those of the flow's body.
 
@@ -52,7 +67,7 @@ def averaged_motion(
     return EulerSolution(kept, *found, omega, means, status, float(motion.t[-1]), order)
 
 
-def _third(flow: EulerAverage, first: SlowState, tau: float, t: Array, eps: float, rtol: float) -> EulerSolution:
+def _third(flow: AveragedEuler, first: SlowState, tau: float, t: Array, eps: float, rtol: float) -> EulerSolution:
     x0 = np.array([float(first.Omega), float(first.k), tau])
     rate = float(flow.body.frequency(first.Omega, first.k, tau))
     kept, mean, full, status, end = third_order_motion(
