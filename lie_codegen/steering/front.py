@@ -101,7 +101,8 @@ def steer(
         duration: seconds.
         method: "auto": "ocp" for costs, constraints or parameters of one's own, "direct" for goal sets, fuel, bounds and drift,
             "transcription" if another option asks for it (obstacles, rates, torques ...), else "optimal";
-            "direct": bounds, drift, goal sets, fuel, functions of time: reaches from many starts, then descends;
+            "direct": bounds, drift, goal sets, fuel, functions of time: reaches from many starts, then descends; also least
+                time under bounded torques (dynamics="second_order"): arcs of constant torque with exact switches;
             "four_phase": closed form, section 5.2 of TR 93-59; two controls; form="single" for its single-exponential design (66);
             "swing_twist": a constant swing, then a circle, exact; two controls on SO(3), SU(2);
             "sinusoids": a line and one sinusoid a bracket, exact; chained systems (h3, engel ...);

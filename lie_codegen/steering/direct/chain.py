@@ -30,7 +30,7 @@ def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array,
         after[:, k] = tail
         tail = E[:, k] @ tail
     moved = (goal.left @ before)[:, :, None] @ dE @ (after @ goal.right)[:, :, None]
-    r, reduce = residual(p, goal, X)
+    r, reduce = residual(p.basis, goal, X)
     rows = np.einsum("lnq,lkiq->lnki", reduce, flat(moved))
     J = np.zeros((slots, lanes, rows.shape[1], m))
     moving = np.moveaxis(rows, 2, 0)
@@ -41,13 +41,13 @@ def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array,
     return r, np.einsum("lnq,lq->ln", reduce, r), np.moveaxis(J, 0, 2).reshape(lanes, -1, slots * m)
 
 
-def residual(p: Programme, goal: Goal, X: Array) -> tuple[Array, Array]:
+def residual(basis: Array, goal: Goal, X: Array) -> tuple[Array, Array]:
     """The residual (L, q) and (L, n, q) rows that reduce it: an orthonormal basis of what motions of X change.
 
     With D = dr/dx (q, n) along X hat(x) and D'D = L L', the rows are L^-1 D'.
     """
     here = goal.left @ X @ goal.right
-    slopes = (goal.left @ X)[:, None] @ p.basis @ goal.right
+    slopes = (goal.left @ X)[:, None] @ basis @ goal.right
     value = goal.value
     if goal.free_phase:
         overlap = np.sum(np.conj(value) * here, axis=(1, 2))

@@ -25,11 +25,31 @@ def direct_plan(
         SteeringInputError: an option it does not have.
         Others as `direct`.
     """
+    if options.get("dynamics") == "second_order":
+        return _torques(group, target, controls, duration, tolerance, options)
     known = direct_options()
+    _refuse_others("direct", known, options)
+    return direct(group, target, controls, duration, tolerance=tolerance, **options)
+
+
+def _torques(
+    group: MatrixGroup,
+    target: Any,
+    controls: Sequence[Any],
+    duration: float,
+    tolerance: float,
+    options: Mapping[str, Any],
+) -> Plan:
+    from lie_codegen.steering.direct.torque_time import least_time_torques
+
+    _refuse_others("direct, with torques,", set(least_time_torques.__kwdefaults__ or {}) | {"dynamics"}, options)
+    return least_time_torques(group, target, controls, duration, tolerance, **options)
+
+
+def _refuse_others(what: str, known: set[str], options: Mapping[str, Any]) -> None:
     unknown = sorted(set(options) - known)
     if unknown:
-        raise SteeringInputError(f"direct has no option {', '.join(unknown)}; it has {', '.join(sorted(known))}")
-    return direct(group, target, controls, duration, tolerance=tolerance, **options)
+        raise SteeringInputError(f"{what} has no option {', '.join(unknown)}; it has {', '.join(sorted(known))}")
 
 
 def direct_options() -> set[str]:

@@ -7,7 +7,8 @@ semismooth Newton's method on its dual, then a few undamped steps of stage 1 to 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ _ROUNDING = 1e-13
 
 
 @dataclass
-class _Lanes:
+class Lanes:
     """Controls (L, C) and what is known there: residual norm (L,), reduced residual (L, n) and its derivative (L, n, C)."""
 
     u: Array
@@ -29,26 +30,39 @@ class _Lanes:
     r: Array
     J: Array
 
-    def take(self, rows: Array, other: _Lanes, picked: Array) -> None:
+    def lanes(self, rows: Rows) -> Lanes:
+        """Some of the lanes, copied."""
+        return Lanes(*(getattr(self, each.name)[rows] for each in fields(self)))
+
+    def take(self, rows: Array, other: Lanes, picked: Array) -> None:
         """Lanes `picked` of another become the lanes `rows` of this."""
         for each in fields(self):
             getattr(self, each.name)[rows] = getattr(other, each.name)[picked]
 
 
 @dataclass(frozen=True)
-class _Box:
+class Box:
+    """Limits (C,), weights of the objective and lengths of the slots."""
+
     low: Array
     high: Array
     weight: Array
     mass: Array
 
     @staticmethod
-    def of(p: Programme) -> _Box:
-        return _Box(p.low.ravel(), p.high.ravel(), p.weight.ravel(), np.repeat(p.mass, p.low.shape[1]))
+    def of(p: Programme) -> Box:
+        """The box of a programme."""
+        return Box(p.low.ravel(), p.high.ravel(), p.weight.ravel(), np.repeat(p.mass, p.low.shape[1]))
 
     def objective(self, fuel: bool, u: Array) -> Array:
+        """sum w |u| or 1/2 sum w u^2, (L,)."""
         w = self.weight * self.mass
         return np.asarray(np.abs(u) @ w if fuel else u**2 @ w / 2)
+
+
+Rows = NDArray[np.int_]
+#: (numbers of lanes, controls (k, C) of those) -> what is known there.
+Look = Callable[[Rows, Array], Lanes]
 
 
 class NumpySearch:
@@ -58,55 +72,68 @@ class NumpySearch:
 
     def linearise(self, programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:
         """See `Machine`."""
-        at = _at(programme, goal, u.reshape(len(u), -1))
+        at = _look(programme, goal)(np.arange(len(u)), u.reshape(len(u), -1))
         return at.size, at.r, at.J
 
     def reach(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
         """See `Machine`."""
-        box = _Box.of(programme)
-        at = _at(programme, goal, np.clip(u.reshape(len(u), -1), box.low, box.high))
-        used = _arrive(
-            programme, goal, box, at, settings.reach_iterations, settings.enough, settings.damping, settings.wanted
-        )
-        return Reached(at.u.reshape(u.shape), at.size, box.objective(settings.fuel, at.u), np.zeros_like(at.r), used)
+        found = reach(_look(programme, goal), Box.of(programme), u.reshape(len(u), -1), settings)
+        return replace(found, u=found.u.reshape(u.shape))
 
     def descend(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
         """See `Machine`."""
-        box = _Box.of(programme)
-        at = _at(programme, goal, np.clip(u.reshape(len(u), -1), box.low, box.high))
-        rho, quiet, used = np.ones(len(u)), np.zeros(len(u)), np.zeros(len(u), int)
-        y = np.zeros_like(at.r)
-        best = box.objective(settings.fuel, at.u)
-        enough = 100 * settings.enough
-        for _ in range(settings.descend_iterations):
-            act = np.flatnonzero((quiet < 2) & (rho < 1e6))
-            if not len(act):
-                break
-            here = _Lanes(at.u[act], at.size[act], at.r[act], at.J[act])
-            v, multipliers = _proximal(box, settings.fuel, here, y[act], rho[act])
-            part, aim = chosen(programme, goal, act)
-            trial = _at(part, aim, v)
-            _arrive(part, aim, box, trial, 12, settings.enough, 1e-9, len(act) + 1)
-            cost = box.objective(settings.fuel, trial.u)
-            better = (trial.size < enough) & (cost < best[act])
-            small = better & (best[act] - cost <= settings.relative * best[act])
-            quiet[act] = np.where(small, quiet[act] + 1, np.where(better, 0, quiet[act]))
-            rho[act] = np.where(better, np.maximum(rho[act] / 3, 1e-6), rho[act] * 4)
-            rows = act[better]
-            at.take(rows, trial, better)
-            y[rows], best[rows] = multipliers[better], cost[better]
-            used[act] += 1
-        return Reached(at.u.reshape(u.shape), at.size, best, y, used)
+        found = descend(_look(programme, goal), Box.of(programme), u.reshape(len(u), -1), settings)
+        return replace(found, u=found.u.reshape(u.shape))
 
 
-def _at(p: Programme, goal: Goal, u: Array) -> _Lanes:
-    full, r, J = linearise(p, goal, u.reshape(len(u), *p.low.shape))
-    return _Lanes(u, np.linalg.norm(full, axis=1), r, J)
+def reach(look: Look, box: Box, u: Array, settings: Settings) -> Reached:
+    """From any controls (L, C) towards the goal, within the box."""
+    rows = np.arange(len(u))
+    at = look(rows, np.clip(u, box.low, box.high))
+    used = _arrive(look, rows, box, at, settings.reach_iterations, settings.enough, settings.damping, settings.wanted)
+    return Reached(at.u, at.size, box.objective(settings.fuel, at.u), np.zeros_like(at.r), used)
+
+
+def descend(look: Look, box: Box, u: Array, settings: Settings) -> Reached:
+    """From controls (L, C) that reach the goal to cheaper ones that do."""
+    at = look(np.arange(len(u)), np.clip(u, box.low, box.high))
+    rho, quiet, used = np.ones(len(u)), np.zeros(len(u)), np.zeros(len(u), int)
+    y = np.zeros_like(at.r)
+    best = box.objective(settings.fuel, at.u)
+    enough = 100 * settings.enough
+    for _ in range(settings.descend_iterations):
+        act = np.flatnonzero((quiet < 2) & (rho < 1e6))
+        if not len(act):
+            break
+        v, multipliers = _proximal(box, settings.fuel, at.lanes(act), y[act], rho[act])
+        trial = look(act, v)
+        _arrive(look, act, box, trial, 12, settings.enough, 1e-9, len(act) + 1)
+        cost = box.objective(settings.fuel, trial.u)
+        better = (trial.size < enough) & (cost < best[act])
+        small = better & (best[act] - cost <= settings.relative * best[act])
+        quiet[act] = np.where(small, quiet[act] + 1, np.where(better, 0, quiet[act]))
+        rho[act] = np.where(better, np.maximum(rho[act] / 3, 1e-6), rho[act] * 4)
+        rows = act[better]
+        at.take(rows, trial, better)
+        y[rows], best[rows] = multipliers[better], cost[better]
+        used[act] += 1
+    return Reached(at.u, at.size, best, y, used)
+
+
+def _look(p: Programme, goal: Goal) -> Look:
+    """Of a chain of exponentials."""
+
+    def look(lanes: Rows, u: Array) -> Lanes:
+        part, aim = chosen(p, goal, lanes)
+        full, r, J = linearise(part, aim, u.reshape(len(u), *p.low.shape))
+        return Lanes(u, np.linalg.norm(full, axis=1), r, J)
+
+    return look
 
 
 def _arrive(
-    p: Programme, goal: Goal, box: _Box, at: _Lanes, iterations: int, enough: float, damping: float, wanted: int
-) -> NDArray[np.int_]:
+    look: Look, lanes: Rows, box: Box, at: Lanes, iterations: int, enough: float, damping: float, wanted: int
+) -> Rows:
     """Damped steps of all lanes towards the goal, in place; steps taken by each."""
     damped = np.full(len(at.u), damping)
     used = np.zeros(len(at.u), int)
@@ -114,9 +141,8 @@ def _arrive(
         act = np.flatnonzero((at.size > enough) & (damped < _MOST))
         if not len(act) or np.sum(at.size <= enough) >= wanted:
             break
-        here = _Lanes(at.u[act], at.size[act], at.r[act], at.J[act])
-        part, aim = chosen(p, goal, act)
-        trial = _at(part, aim, np.clip(here.u + _damped_step(box, here, damped[act]), box.low, box.high))
+        here = at.lanes(act)
+        trial = look(lanes[act], np.clip(here.u + _damped_step(box, here, damped[act]), box.low, box.high))
         better = trial.size < here.size
         at.take(act[better], trial, better)
         damped[act] = np.where(better, np.maximum(damped[act] / 5, _LEAST), damped[act] * 6)
@@ -124,7 +150,7 @@ def _arrive(
     return used
 
 
-def _damped_step(box: _Box, at: _Lanes, damped: Array) -> Array:
+def _damped_step(box: Box, at: Lanes, damped: Array) -> Array:
     """-J'(J J' + damping)^-1 r, a control at a bound that pulls outwards left where it is."""
     pull = np.einsum("lnc,ln->lc", at.J, at.r)
     free = ~(((at.u <= box.low) & (pull > 0)) | ((at.u >= box.high) & (pull < 0)))
@@ -135,7 +161,7 @@ def _damped_step(box: _Box, at: _Lanes, damped: Array) -> Array:
     return np.asarray(-np.einsum("lnc,ln->lc", J, np.linalg.solve(K, at.r[..., None])[..., 0]))
 
 
-def _proximal(box: _Box, fuel: bool, at: _Lanes, y: Array, rho: Array) -> tuple[Array, Array]:
+def _proximal(box: Box, fuel: bool, at: Lanes, y: Array, rho: Array) -> tuple[Array, Array]:
     """min objective(v) + rho/2 |v - u|^2 over the box with J v = J u - r; v and the multipliers y, from a first guess of y."""
     want = np.einsum("lnc,lc->ln", at.J, at.u) - at.r
     scale = rho[:, None]
