@@ -31,6 +31,8 @@ from lie_codegen.signals.time_series import expressions_of, functions_of
 FORMS = {"floquet": None, "product": (1, 2), "single": (1, 2, 3)}
 _THEOREMS = {"product": "Theorem 3 (area rule)", "single": "Theorem 4 (single-exponential area rule)"}
 _MOST = 32
+#: Operations of the formulas that a notebook shows.
+_SHOWN = 200
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,6 +70,14 @@ class Averaged(Saved):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Averaged.restored, (self.group, self.u, self.order, self.form, self.X0)
+
+    def _repr_latex_(self) -> str | None:
+        """In a notebook: the mean velocity sum_q eps^q F_q, exact; None where it fills more than a line or two."""
+        terms = [(sp.Symbol("varepsilon") ** q, sp.ImmutableMatrix(f)) for q, f in enumerate(self.exact_F, start=1)]
+        if sum(sp.count_ops(f) for _, f in terms) > _SHOWN:
+            return None
+        text = " + ".join(f"{sp.latex(power)} {sp.latex(f)}" for power, f in terms)
+        return rf"$\displaystyle \bar u = {text}$"
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +20,7 @@ from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved, json_value, table_text
+from lie_codegen.steering.plan_sketch import moments, sketch
 from lie_codegen.values import Value, settle
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
@@ -311,6 +313,14 @@ class Plan(Saved):
         """
         parts: PackageParts = import_module(PACKAGE).plan_parts(self, name, real, form or "auto")
         return parts
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the few lines of its repr, and a small picture of what its controls do."""
+        t = moments(self.duration)
+        curves = self.inputs(t).reshape(t.size, -1)
+        columns = curves.shape[1]
+        names = self.controls if len(self.controls) == columns else [f"u{i + 1}" for i in range(columns)]
+        return f"<pre>{escape(repr(self))}</pre>{sketch(t, curves, names)}"
 
     def inputs(self, t: ArrayLike) -> Array:
         """What each control does: (m,) at a time, (k, m) at (k,) times; u(t) = sum_i inputs_i b_i(t), without the drift."""
