@@ -83,3 +83,31 @@ def test_the_python_of_the_guide_runs() -> None:
     for block in re.findall(r"```python\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL):
         exec(compile(block, str(guide), "exec"), names)  # noqa: S102  our own text
     assert "pulse" in names
+
+
+@pytest.mark.parametrize("method", ["direct", "transcription"])
+def test_a_path_is_a_guess_with_its_times_or_without(method: str) -> None:
+    """The way about the axis of a turn; at uneven times, quick in the middle."""
+    so3 = lc.group("so3")
+    turn = np.array([0.4, -0.3, 0.7])
+    target = expm(so3.hat(turn))
+    t = np.linspace(0, 1, 21) ** 2
+    even = np.array([expm(s * so3.hat(turn)) for s in np.linspace(0, 1, 21)])
+    uneven = np.array([expm(s * so3.hat(turn)) for s in t])
+    best = lc.steer(so3, target, ("w1", "w2"), 2.0)
+    for guess in (even, (uneven, 2 * t)):
+        plan = lc.steer(so3, target, ("w1", "w2"), 2.0, method=method, guess=guess, starts=1, bounds=3)
+        assert plan.error < 1e-6
+        assert plan.cost >= best.cost * (1 - 1e-6)
+    with pytest.raises(lc.errors.ShapeError, match="increasing times"):
+        lc.steer(so3, target, ("w1", "w2"), 2.0, method=method, guess=(uneven, -t), bounds=3)
+
+
+def test_a_path_with_times_is_the_same_motion_at_equal_times() -> None:
+    from lie_codegen.steering.path_samples import path_of, path_velocities
+
+    so3, turn, t = lc.group("so3"), np.array([0.4, -0.3, 0.7]), np.linspace(0, 1, 9) ** 2
+    given = np.array([expm(s * so3.hat(turn)) for s in t])
+    path = path_of(so3, (given, 2 * t), "guess")
+    assert path is not None
+    np.testing.assert_allclose(path_velocities(so3, path, 0.25), np.tile(turn / 2, (8, 1)), atol=1e-12)

@@ -34,7 +34,13 @@ def flown(arcs: Any, J: np.ndarray, xi0: np.ndarray) -> tuple[np.ndarray, np.nda
 def test_half_a_turn_of_a_cube_takes_the_time_of_bilimoria_and_wie() -> None:
     so3 = lc.group("so3")
     half = expm(so3.hat([0, 0, np.pi]))
-    options = {"dynamics": "second_order", "objective": "time", "inertia": 1.0, "bounds": 1, "rounds": 1}
+    options: dict[str, Any] = {
+        "dynamics": "second_order",
+        "objective": "time",
+        "inertia": 1.0,
+        "bounds": 1,
+        "rounds": 1,
+    }
     plan = lc.steer(so3, half, AXES, 3.5, method="direct", **options)
     R, xi = flown(plan.details["arcs"], np.eye(3), np.zeros(3))
     np.testing.assert_allclose(R, half, atol=1e-8)
@@ -52,7 +58,7 @@ def test_half_a_turn_of_a_cube_takes_the_time_of_bilimoria_and_wie() -> None:
 def test_a_turn_of_an_uneven_body_is_no_slower_than_by_the_transcription() -> None:
     so3, J = lc.group("so3"), np.diag([1.0, 2.0, 1.5])
     target = expm(so3.hat([0.4, -0.3, 0.7]))
-    options = {"dynamics": "second_order", "objective": "time", "inertia": (1, 2, 1.5), "bounds": 1}
+    options: dict[str, Any] = {"dynamics": "second_order", "objective": "time", "inertia": (1, 2, 1.5), "bounds": 1}
     plan = lc.steer(so3, target, AXES, 2.0, method="direct", **options)
     assert plan.duration < lc.steer(so3, target, AXES, 2.0, method="transcription", **options).duration
     R, xi = flown(plan.details["arcs"], J, np.zeros(3))

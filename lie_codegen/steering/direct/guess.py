@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError
 from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.path_samples import path_of, path_velocities
 from lie_codegen.steering.plan import Plan
 
 
@@ -28,10 +28,8 @@ def guessed(task: Manoeuvre, guess: Any, pieces: int) -> Array | None:
     elif callable(guess):
         values = np.array([np.asarray(guess(float(t)), dtype=float) for t in s * task.duration])
     else:
-        samples = np.asarray(guess)
-        if samples.ndim == 3 and samples.shape[1:] == (task.system.group.degree,) * 2:
-            samples = _of_path(task, samples)
-        values = np.asarray(samples, dtype=float)
+        path = path_of(task.system.group, guess, f"steer({name}): guess")
+        values = np.asarray(guess if path is None else _of_path(task, path), dtype=float)
         if values.ndim != 2 or len(values) < 1 or values.shape[1] != m:
             raise ShapeError(
                 f"steer({name}): guess has shape {values.shape}; give (k, {m}) controls, a path (k, d, d), or a function of t"
@@ -55,16 +53,10 @@ def _of_plan(task: Manoeuvre, plan: Plan, s: Array) -> Array:
 
 def _of_path(task: Manoeuvre, X: Array) -> Array:
     """Controls whose velocity is nearest to that of a path at equal times, log(X_k^-1 X_(k+1)) / dt."""
-    from lie_codegen.flow.logarithm import matrix_log
-
     system, steps = task.system, len(X) - 1
     h = task.duration / steps
-    rows = []
-    for a, b in pairwise(X):
-        step = b @ np.linalg.inv(a) if system.right else np.linalg.solve(a, b)
-        rows.append(matrix_log(system.group, step)[0] / h)
     t = (np.arange(steps) + 0.5) * h
-    return _projected(task, np.array(rows) - system.drift.at(t), t)
+    return _projected(task, path_velocities(system.group, X, h, right=system.right) - system.drift.at(t), t)
 
 
 def _projected(task: Manoeuvre, velocities: Array, t: Array) -> Array:

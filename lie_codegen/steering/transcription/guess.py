@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, NotFiniteError, ShapeError
 from lie_codegen.steering.obstacles.homotopy import planar_discs
 from lie_codegen.steering.obstacles.path_guess import PathGuess, moves_in_the_plane, path_guesses
+from lie_codegen.steering.path_samples import path_of, path_velocities
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.extremals import SOLVED
@@ -39,10 +40,16 @@ def given_guess(task: Task, structure: Structure, numbers: Numbers, guess: Any) 
         values = guess.u(s * guess.duration)[:, list(structure.controls)] * guess.duration
     elif callable(guess):
         values = np.array([np.asarray(guess(float(t)), dtype=float) for t in s * task.duration]) * task.duration
+    elif (path := path_of(task.group, guess, where)) is not None:
+        rates = path_velocities(task.group, path, 1 / (len(path) - 1)) - numbers.drift
+        middle = (np.arange(len(rates)) + 0.5) / len(rates)
+        values = np.column_stack([np.interp(s, middle, rates[:, i]) for i in structure.controls])
     else:
         samples = np.asarray(guess, dtype=float)
         if samples.ndim != 2 or samples.shape[1] != m or len(samples) < 2:
-            raise ShapeError(f"{where} has shape {samples.shape}; give (k, {m}) samples, a function of t, or a plan")
+            raise ShapeError(
+                f"{where} has shape {samples.shape}; give (k, {m}) samples, a path (k, d, d), a function of t, or a plan"
+            )
         there = np.linspace(0, 1, len(samples))
         values = np.column_stack([np.interp(s, there, column) for column in samples.T]) * task.duration
     if values.shape != (len(s), m):
