@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "ode_table.h" /* A, B, C, E3, E5 of twelve stages */
+#include "pair_step.h"
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
@@ -61,32 +61,15 @@ static int evaluate(const Field *field, double t, const double *y, double *resul
     return 0;
 }
 
+static int slope_of(const void *who, double t, const double *y, double *slope)
+{
+    return evaluate(who, t, y, slope);
+}
+
 /* The stages k_2 .. k_12 of a step of length h from (t, y), k_1 being known, and the state after it. */
 static int step(const Field *field, double t, const double *y, double h, double *k, double *next)
 {
-    const ptrdiff_t n = field->size;
-    ptrdiff_t i;
-    int s, j;
-    for (s = 1; s < STAGES; ++s) {
-        for (i = 0; i < n; ++i) {
-            double sum = 0.0;
-            for (j = 0; j < s; ++j) {
-                sum += A[s][j] * k[j * n + i];
-            }
-            next[i] = y[i] + h * sum;
-        }
-        if (evaluate(field, t + C[s] * h, next, k + s * n)) {
-            return 1;
-        }
-    }
-    for (i = 0; i < n; ++i) {
-        double sum = 0.0;
-        for (j = 0; j < STAGES; ++j) {
-            sum += B[j] * k[j * n + i];
-        }
-        next[i] = y[i] + h * sum;
-    }
-    return 0;
+    return pair_step(slope_of, field, field->size, t, y, h, k, next, next);
 }
 
 /* Root mean square of the error in units of the tolerance; NaN counts as infinite. */
@@ -95,24 +78,13 @@ static double error_of(const Field *field, const Rules *rules, const double *y, 
     const ptrdiff_t n = field->size;
     double five = 0.0, three = 0.0, both;
     ptrdiff_t i;
-    int j;
     for (i = 0; i < n; ++i) {
-        const double scale = rules->atol[i] + rules->rtol * fmax(fabs(y[i]), fabs(next[i]));
-        double a = 0.0, b = 0.0;
-        for (j = 0; j < STAGES; ++j) {
-            a += E5[j] * k[j * n + i];
-            b += E3[j] * k[j * n + i];
-        }
-        five += a * a / (scale * scale);
-        three += b * b / (scale * scale);
+        pair_error_add(k, n, i, rules->atol[i] + rules->rtol * fmax(fabs(y[i]), fabs(next[i])), &five, &three);
         if (!(fabs(next[i]) < HUGE_VAL)) {
             return HUGE_VAL;
         }
     }
-    if (five == 0.0 && three == 0.0) {
-        return 0.0;
-    }
-    both = fabs(h) * five / sqrt((five + 0.01 * three) * (double)n);
+    both = pair_error(five, three, h, n);
     return both < HUGE_VAL ? both : HUGE_VAL;
 }
 

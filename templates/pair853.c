@@ -13,7 +13,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "ode_table.h" /* A, B, C, E3, E5 of twelve stages */
+#include "pair_step.h"
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
@@ -87,30 +87,28 @@ static void settle(Pair *p, double *X, double *y, double *scratch)
     }
 }
 
+/* Where in a run the slopes are asked for: within a step X stays. */
+typedef struct {
+    Pair *pair;
+    const double *X;
+} Within;
+
+static int slope_of(const void *who, double t, const double *y, double *slope)
+{
+    const Within *within = who;
+    rates(within->pair, within->X, y, t, slope);
+    return 0;
+}
+
 /* The stages of a step of length h behind the first, k[0], and the state after it. */
 static void advance(Pair *p, const double *X, const double *y, double t, double h, double *k, double *stage, double *after)
 {
-    const ptrdiff_t all = p->members * p->size;
-    for (int s = 1; s <= STAGES; ++s) {
-        const double *a = s < STAGES ? A[s] : B;
-        double *to = s < STAGES ? stage : after;
-        for (ptrdiff_t i = 0; i < all; ++i) { to[i] = 0.0; }
-        for (int j = 0; j < s; ++j) {
-            if (a[j] != 0.0) {
-                const double w = a[j], *from = k + j * all;
-                for (ptrdiff_t i = 0; i < all; ++i) { to[i] += w * from[i]; }
-            }
-        }
-        for (ptrdiff_t i = 0; i < all; ++i) { to[i] = y[i] + h * to[i]; }
-        if (s < STAGES) {
-            rates(p, X, stage, t + C[s] * h, k + s * all);
-        }
-    }
+    Within within = {p, X};
+    pair_step(slope_of, &within, p->members * p->size, t, y, h, k, stage, after);
 }
 
 /*
- * The error of a step over what is allowed, of the worst member: that of order 5, damped by that of order 3 (Hairer, Norsett and
- * Wanner, II.10). Entries of Theta are those of X, whose size is one. Negative where |Theta| goes beyond its reach; NaN shows.
+ * The error of a step over what is allowed, of the worst member. Entries of Theta are those of X, whose size is one. Negative where |Theta| goes beyond its reach; NaN shows.
  */
 static double judged(const Pair *p, const double *y, const double *after, double h, const double *k)
 {
@@ -121,18 +119,10 @@ static double judged(const Pair *p, const double *y, const double *after, double
         for (ptrdiff_t i = 0; i < p->size; ++i) {
             const ptrdiff_t at = m * p->size + i;
             const double a = fabs(y[at]), b = fabs(after[at]), size = i < p->group ? 1.0 : a > b ? a : b;
-            const double scale = p->atol + p->rtol * size;
-            double e5 = 0.0, e3 = 0.0;
-            for (int s = 0; s < STAGES; ++s) {
-                e5 += E5[s] * k[s * all + at];
-                e3 += E3[s] * k[s * all + at];
-            }
-            five += e5 * e5 / (scale * scale);
-            three += e3 * e3 / (scale * scale);
+            pair_error_add(k, all, at, p->atol + p->rtol * size, &five, &three);
             angle += i < p->group ? after[at] * after[at] : 0.0;
         }
-        const double down = five + 0.01 * three;
-        const double error = down > 0.0 ? fabs(h) * five / sqrt(down * (double)p->size) : down;
+        const double error = pair_error(five, three, h, p->size);
         if (!(error <= 1e300)) {
             return error;
         }

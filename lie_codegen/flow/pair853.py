@@ -20,7 +20,7 @@ from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, ComputationError
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.call import Compiled
-from lie_codegen.runtime.ode import table_header
+from lie_codegen.runtime.ode import pair_headers
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import share_out
 
@@ -316,7 +316,7 @@ def _library() -> Any:
 
     def files() -> dict[str, str]:
         text = (template_folder() / "pair853.c").read_text(encoding="utf-8")
-        return {"pair853.c": text, "ode_table.h": table_header()}
+        return {"pair853.c": text, **pair_headers()}
 
     try:
         path = build_source(files, "pair853.c", namespace="pair853", definition="pair853", more_flags=("-O3",))

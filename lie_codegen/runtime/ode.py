@@ -291,12 +291,18 @@ def table_header() -> str:
     return "\n".join([f"enum {{ STAGES = {len(dop853.A)} }};", *rows, ""])
 
 
+def pair_headers() -> dict[str, str]:
+    """The headers of one step of the pair 8(5, 3), which ode.c and pair853.c include."""
+    step = (template_folder() / "pair_step.h").read_text(encoding="utf-8")
+    return {"pair_step.h": step, "ode_table.h": table_header()}
+
+
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL | None:
     """The compiled loops; None where there is no compiler."""
 
     def files() -> dict[str, str]:
-        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), "ode_table.h": table_header()}
+        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), **pair_headers()}
 
     try:
         path = build_source(files, "ode.c", namespace="lie_codegen_ode", definition="ode")
