@@ -237,7 +237,9 @@ def integrate(
             event = int(result[2]) if status == EVENT else -1
             return Motion(np.concatenate(pieces_t), np.concatenate(pieces_y), status, event, evaluations, rate)
         ahead = (kept - 1) * abs(t1 - times[kept - 1]) / max(abs(times[kept - 1] - times[0]), 5e-324)
-        hopeless = held > _ENOUGH_KNOTS and ahead * rate.size > _HOPELESS * _MOST_DOUBLES
+        # Where the steps still shrink they go towards an end of the solution, and will soon be refused there.
+        steady = abs(times[kept - 1] - times[kept - 2]) > 0.5 * abs(times[1] - times[0])
+        hopeless = held > _ENOUGH_KNOTS and steady and ahead * rate.size > _HOPELESS * _MOST_DOUBLES
         if held * rate.size > _MOST_DOUBLES or hopeless:
             raise ComputationError(
                 f"the solution takes {held} steps up to t = {times[kept - 1]:.6g} of {t1:.6g}: it is stiff, or too long"
