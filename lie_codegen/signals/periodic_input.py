@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,6 +57,7 @@ class PeriodicInput(Saved):
         period: T as a text, a number or a SymPy expression; the smallest common period if not given. [time unit]
         parameters: names of symbolic amplitudes and phases.
         breakpoints: times in (0, T) at which u or a derivative jumps.
+        waveform: what averages are derived from: exact trigonometric polynomials, pieces of such, or values; follows from the others.
         pieces: of an input in pieces, (end, formulas) of each.
         table: of a function, the edges of panels of [0, T] and its values at their Chebyshev nodes. They stand for the function in
             comparisons, and in a pickle or a file: the copy interpolates, to rounding where the function is smooth.
@@ -71,9 +72,9 @@ class PeriodicInput(Saved):
     period: Any = Deferred(None)
     parameters: Sequence[str] = ()
     breakpoints: Sequence[float] = ()
+    waveform: Waveform = field(default=Deferred(), repr=False, compare=False, metadata={"derived": True})  # type: ignore[assignment]
     pieces: Pieces = field(default=(), repr=False)
     table: tuple[Array, ...] = field(default=(), repr=False)
-    function: Any = field(default=None, repr=False, compare=False, metadata={"derived": True})
 
     def __post_init__(self) -> None:
         given = vars(self)["components"]
@@ -88,8 +89,11 @@ class PeriodicInput(Saved):
             _given=vars(self)["period"],
         )
         if isinstance(given, _Seen):
-            settle(self, _numbers=given.numbers, _derive=given.waveform)
+            settle(self, _numbers=given.numbers, waveform=Later(given.waveform))
             return
+        # Only a function says more than the other fields do; what they determine is never taken from a caller.
+        if not (self.table and isinstance(vars(self)["waveform"], SampledWaveform)):
+            settle(self, waveform=Later(self._made))
         _ = self._numbers  # refuses what is no input
         settle(self, period=Later(lambda: self.waveform.period))
 
@@ -105,11 +109,8 @@ class PeriodicInput(Saved):
 
         return made() if source is None else recalled_numbers(source, made)
 
-    @cached_property
-    def waveform(self) -> Waveform:
-        """What averages are derived from: exact trigonometric polynomials, pieces of such, or values."""
-        if "_derive" in vars(self):
-            return cast(Waveform, vars(self)["_derive"]())
+    def _made(self) -> Waveform:
+        """The waveform, from pieces, a table or formulas."""
         if self.pieces:
             symbols = {name: symbol_of(name) for name in self.parameters}
             ends = [number_of(end, "the end of a piece", {}) for end, _ in self.pieces]
@@ -117,8 +118,7 @@ class PeriodicInput(Saved):
             return piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
         if self.table:
             panels, values = Panels(self.table[0]), self.table[1]
-            function = self.function or Interpolated(panels, values)
-            return SampledWaveform(panels, values, function, period_of(self._given_period, {}))
+            return SampledWaveform(panels, values, Interpolated(panels, values), period_of(self._given_period, {}))
         return formula_waveform(self.components, self._given_period, self.parameters, self.breakpoints)
 
     @property
@@ -128,7 +128,7 @@ class PeriodicInput(Saved):
     def __reduce__(self) -> tuple[Any, ...]:
         period = self.period if isinstance(self._given_period, Later) else self._given_period
         given = (self.components, period, self.parameters, self.breakpoints)
-        return PeriodicInput, (*given, self.pieces, self.table)
+        return PeriodicInput, (*given, None, self.pieces, self.table)
 
     def as_formula(self, start: float, end: float) -> FormulaInput | None:
         """u on [start, end] as a compiled loop evaluates it; None where it is neither a Fourier series nor straight pieces."""
@@ -179,7 +179,8 @@ class PeriodicInput(Saved):
 
         panels, values = resolve(doubles, length, breakpoints)
         names = ("a function",) * probe.shape[1]
-        return PeriodicInput(names, exact, (), tuple(breakpoints), table=(panels.edges, values), function=doubles)
+        waveform = SampledWaveform(panels, values, doubles, exact)
+        return PeriodicInput(names, exact, (), tuple(breakpoints), waveform, table=(panels.edges, values))
 
     @staticmethod
     def from_samples(values: ArrayLike, period: Any) -> PeriodicInput:
@@ -385,7 +386,7 @@ def _in_pieces(given: Pieces, parameters: Sequence[str]) -> PeriodicInput:
     names = ("in pieces",) * len(formulas[0])
     try:
         piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
-        return PeriodicInput(names, ends[-1], tuple(symbols), inside, given)
+        return PeriodicInput(names, ends[-1], tuple(symbols), inside, pieces=given)
     except (NotTrigonometricError, PeriodError):
         free = set().union(*(f.free_symbols for row in formulas for f in row)) - {time_symbol()}
         if free:
