@@ -1,4 +1,4 @@
-"""Kernels as CUDA and OpenCL text: run on this processor by headers that stand in for a device, by pocl, and compiled by nvcc."""
+"""Kernels as CUDA and OpenCL text: run on this processor by headers that stand in for a device, by pocl, and compiled by clang and nvcc."""
 
 from __future__ import annotations
 
@@ -145,6 +145,57 @@ def test_nvcc_takes_the_cuda_text(tmp_path: Path, real: str) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert ".entry se3_exp_batch" in (tmp_path / "se3.ptx").read_text()
+
+
+#: What nvcc knows of itself and clang takes from CUDA's headers: threads and the mathematics.
+DEVICE = """
+#define __global__ __attribute__((global))
+#define __device__ __attribute__((device))
+#define NAN __builtin_nanf("")
+#define HUGE_VAL __builtin_huge_val()
+#define HUGE_VALF __builtin_huge_valf()
+struct Place { int x; };
+#define threadIdx (Place{__nvvm_read_ptx_sreg_tid_x()})
+#define blockIdx (Place{__nvvm_read_ptx_sreg_ctaid_x()})
+#define blockDim (Place{__nvvm_read_ptx_sreg_ntid_x()})
+#define ONE(name) extern "C" __device__ double name(double); extern "C" __device__ float name##f(float);
+#define TWO(name) extern "C" __device__ double name(double, double); extern "C" __device__ float name##f(float, float);
+ONE(sin) ONE(cos) ONE(tan) ONE(asin) ONE(acos) ONE(atan) ONE(sinh) ONE(cosh) ONE(tanh) ONE(exp) ONE(expm1) ONE(log)
+ONE(sqrt) ONE(fabs) ONE(floor) ONE(ceil) TWO(atan2) TWO(pow) TWO(copysign) TWO(fmin) TWO(fmax)
+"""
+CLANG = {
+    "cuda": (
+        "-x",
+        "cuda",
+        "--cuda-gpu-arch=sm_70",
+        "--cuda-device-only",
+        "-nocudainc",
+        "-nocudalib",
+        "-Wno-unknown-cuda-version",
+    ),
+    "opencl": ("-x", "cl", "-cl-std=CL1.2", "-Xclang", "-finclude-default-header", "--target=nvptx64-nvidia-nvcl"),
+}
+
+
+@pytest.mark.parametrize("target", ["opencl", "cuda"])
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_clang_makes_machine_code_of_a_device_from_the_text(tmp_path: Path, target: str, real: str) -> None:
+    """PTX, in which every kernel is an entry."""
+    if (
+        shutil.which("clang") is None
+        or b"nvptx64" not in subprocess.run(["clang", "-print-targets"], capture_output=True).stdout
+    ):
+        pytest.skip("no clang for such devices")
+    text = lc.device_source("se3", target=target, real=real)
+    (tmp_path / "se3").write_text((DEVICE if target == "cuda" else "") + text)
+    done = subprocess.run(
+        ["clang", *CLANG[target], "-O1", "-S", str(tmp_path / "se3"), "-o", str(tmp_path / "se3.ptx")], capture_output=True, text=True, check=False
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    wanted = {kernel.symbol for kernel in lc.group_kernels("se3") if f"{kernel.symbol}_batch(" in text}
+    machine = (tmp_path / "se3.ptx").read_text()
+    assert len(wanted) >= 12
+    assert {symbol for symbol in wanted if f".entry {symbol}_batch" in machine} == wanted
 
 
 def test_a_stride_of_zero_and_names_that_are_taken_are_no_trouble() -> None:
