@@ -135,3 +135,25 @@ def test_no_way_is_proved_for_a_set_too_and_other_methods_name_those_that_take_o
         lc.steer("se2", lc.Position((9, 0)), ("omega", "vx"), 1.0, bounds=1, obstacles=[lc.Ball((4.0, 0.0), 0.5)])
     with pytest.raises(lc.errors.SteeringInputError, match="transcription"):
         lc.steer("se2", lc.Position((0, 1)), ("omega", "vx"), 1.0, method="area_rule")
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_open_layer_ends_in_a_coset_as_the_direct_method_does(side: str) -> None:
+    so3 = lc.group("so3")
+    goal = lc.Coset(expm(so3.hat([0.4, -0.3, 0.7])), free=("w1",), side=side)
+    ours = lc.steer(so3, goal, ("w1", "w2"), 1.0)
+    open_ = lc.steer(so3, goal, ("w1", "w2"), 1.0, method="ocp")
+    assert open_.cost == pytest.approx(ours.cost, rel=2e-3)  # constant on its intervals
+    T = np.array(goal.element)
+    turn = T.T @ open_.X_final if side == "right" else open_.X_final @ T.T
+    np.testing.assert_allclose(turn[:, 0], [1, 0, 0], atol=1e-7)
+
+
+def test_the_open_layer_takes_a_gate_up_to_its_phase_and_refuses_what_it_cannot_say() -> None:
+    su2 = lc.group("su2")
+    gate = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
+    plan = lc.steer(su2, lc.UpToPhase(gate), ("sx", "sy"), 1.0, method="ocp")
+    assert plan.cost == pytest.approx(15.507140, rel=1e-3)
+    assert abs(np.vdot(gate, plan.X_final)) / 2 == pytest.approx(1, abs=1e-9)
+    with pytest.raises(lc.errors.SteeringInputError, match="Coset"):
+        lc.steer(su2, lc.Coset(np.eye(2), free=("sz",)), ("sx", "sy"), 1.0, method="ocp")

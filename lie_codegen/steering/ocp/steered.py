@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputErro
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.direct.system import velocity
-from lie_codegen.steering.goals import Pointing, Position
+from lie_codegen.steering.goals import Coset, Pointing, Position, UpToPhase, cosets
 from lie_codegen.steering.ocp.problem_data import Affine
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status
@@ -51,7 +52,8 @@ def open_plan(
 
     Args:
         group, target, controls, duration, tolerance: as `lc.steer`; a pair of durations is searched between. Goals are
-            elements, `Pointing` or `Position`.
+            elements, `Pointing`, `Position`, `UpToPhase`, and a `Coset` of a real group whose free motions are all that keep some
+            vectors where they are (turns about an axis).
         cost: l of `lc.ocp`, in X, u, t and the parameters; norm2(u) if not given, so that the cost is int |u|^2 dt.
         terminal_cost, constraints: phi and g of `lc.ocp`.
         parameters: {name: value} of the formulas.
@@ -65,6 +67,13 @@ def open_plan(
         Others as `lc.ocp` and `solve`.
     """
     group = require_group(group, "steer")
+    if isinstance(target, UpToPhase):
+        asked = {
+            "cost": cost, "terminal_cost": terminal_cost, "constraints": constraints, "parameters": parameters, "bounds": bounds,
+            "drift": drift, "start": start, "intervals": intervals, "starts": starts, "seed": seed, "guess": guess,
+            "quadrature": quadrature, "integrator": integrator,
+        }  # fmt: skip
+        return _cheapest_phase(group, target, controls, duration, tolerance, asked)
     own = {name: np.asarray(value) for name, value in dict(parameters or {}).items()}
     terminal, goal, values = _goal(group, target, own)
     shapes = tuple((name, "X" if name == _GOAL else value.shape) for name, value in values.items())
@@ -126,6 +135,56 @@ def _constant_drift(group: MatrixGroup, drift: Any) -> dict[str, Array]:
     return {} if constant is None else {"drift": constant}
 
 
+def _cheapest_phase(
+    group: MatrixGroup,
+    target: UpToPhase,
+    controls: Sequence[Any],
+    duration: Any,
+    tolerance: float,
+    asked: dict[str, Any],
+) -> Plan:
+    """The cheapest of the plans to each of the phases of a gate that the group has.
+
+    Raises:
+        SteeringInputError: any phase will do, as on U(d).
+        SteeringError: no phase is reached.
+    """
+    elements, free = cosets(group, target, f"steer({group.name}): target")
+    if len(free):
+        raise SteeringInputError(f"steer({group.name}): every phase is in the group; give the gate with one of them")
+    plans: list[Plan] = []
+    failed: list[SteeringError] = []
+    for element in elements:
+        try:
+            plans.append(open_plan(group, element, controls, duration, tolerance, **asked))
+        except SteeringError as error:
+            failed.append(error)
+    if not plans:
+        raise failed[0]
+    best = min(plans, key=lambda plan: plan.cost)
+    return replace(best, outcome=replace(best.facts, details={**best.details, "goal": target}))
+
+
+def _kept_columns(group: MatrixGroup, target: Coset) -> tuple[Array, Array]:
+    """Columns V (d, k) and T V so that X is in the coset exactly where X V = T V.
+
+    Raises:
+        SteeringInputError: other motions than the free ones keep the vectors that those keep, or the group is complex.
+    """
+    where = f"steer({group.name}): target"
+    elements, free = cosets(group, target, where)
+    if not group.is_complex:
+        _, sizes, across = np.linalg.svd(group.hat(free).reshape(-1, group.degree))
+        V = across[int(np.sum(sizes > 1e-10)) :].T
+        slopes = (group.basis @ V).reshape(group.dim, -1)
+        if group.dim - np.linalg.matrix_rank(slopes, tol=1e-10) == np.linalg.matrix_rank(free, tol=1e-10):
+            return V, elements[0] @ V
+    raise SteeringInputError(
+        f"{where}: with costs or constraints of one's own a Coset must be that of all motions that keep some vectors where they are, "
+        'as turns about an axis do, in a real group; method="direct" and "transcription" take any'
+    )
+
+
 def _goal(
     group: MatrixGroup, target: Any, values: dict[str, Any]
 ) -> tuple[tuple[str, ...], Array | None, dict[str, Any]]:
@@ -141,10 +200,15 @@ def _goal(
         point = np.ones(d)
         point[: d - 1] = np.asarray(target.point, dtype=float)
         return ("X*goal_column - goal_point",), None, {**values, "goal_column": np.eye(d)[-1], "goal_point": point}
+    if isinstance(target, Coset):
+        V, ends = _kept_columns(group, target)
+        pairs = zip(V.T, ends.T, strict=True)
+        fixed = {f"goal_{kind}{k}": each for k, pair in enumerate(pairs) for kind, each in zip("ve", pair, strict=True)}
+        return tuple(f"X*goal_v{k} - goal_e{k}" for k in range(V.shape[1])), None, {**values, **fixed}
     if isinstance(target, Pointing | Position) or not isinstance(target, np.ndarray | list | tuple):
         raise SteeringInputError(
-            f"steer({group.name}): with costs or constraints of one's own the goal is an element, a Pointing or a Position "
-            f"of a real group; got {type(target).__name__}"
+            f"steer({group.name}): with costs or constraints of one's own the goal is an element, a Pointing, a Position or a Coset "
+            f"of a real group, or UpToPhase; got {type(target).__name__}"
         )
     element = group_element(group, target, f"steer({group.name}): target")
     return (f"X - {_GOAL}",), element, {**values, _GOAL: element}
