@@ -52,11 +52,14 @@ def bench(
 
 
 def _steering(only: str, json: bool) -> None:
-    from lie_codegen.benchmarks.bounded import bench_bounded, table
+    from lie_codegen.benchmarks.bounded import bench_bounded, missed, table
 
     with progress("bench steering") as report:
         rows = bench_bounded(only=only, say=report)
-    emit(table(rows), {"rows": [asdict(row) for row in rows]}, json)
+    misses = missed(rows)
+    emit(table(rows, misses), {"rows": [asdict(row) for row in rows], "missed": misses}, json)
+    if misses:
+        raise typer.Exit(1)
 
 
 def _control(json: bool) -> None:

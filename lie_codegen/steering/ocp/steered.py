@@ -97,8 +97,8 @@ def open_plan(
         what, stage = found.worst or ("the first trajectory", 0)
         raise SteeringError(
             f"steer({group.name}): {len(found.starts)} starts found nothing admissible (that none is, is not proved); nearest: "
-            f"{what} at interval {stage} of {intervals} missed by {found.violation:.3g}; try more starts, a longer duration, "
-            f"wider bounds"
+            f"{what} at interval {stage} of {intervals} missed by {found.violation:.3g}; more starts, "
+            f"another seed or a guess may find one, wider bounds may make it possible"
         )
     law = problem.data.velocity
     columns = np.array(law.columns) if isinstance(law, Affine) else np.eye(group.dim)
