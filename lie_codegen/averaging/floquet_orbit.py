@@ -15,7 +15,7 @@ from lie_codegen.averaging.loop_orbit import loop_orbit
 from lie_codegen.averaging.orbit_kernels import formula_orbit_kernels, kernel_orbit_kernels
 from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, eigenvalues, found_orbit
 from lie_codegen.averaging.vector_field import read_formulas
-from lie_codegen.control.closed_loop import ClosedLoop
+from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel

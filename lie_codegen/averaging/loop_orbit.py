@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, eigenvalues, found_orbit
-from lie_codegen.control.closed_loop import ClosedLoop, making_of
 from lie_codegen.control.loop_flow import loop_flow
 from lie_codegen.control.loop_rate import columns, has_rate, loop_settle, moves_of
+from lie_codegen.control.loop_result import ClosedLoop, making_of
 from lie_codegen.errors import InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.saved import Saved

@@ -14,8 +14,9 @@ from lie_codegen.arrays import Array
 from lie_codegen.benchmarks import peers
 from lie_codegen.benchmarks.rows import AbsentError, Entrant, Row, Work, compete
 from lie_codegen.control.attitude_law import attitude_law
-from lie_codegen.control.closed_loop import ClosedLoop, closed_loop
+from lie_codegen.control.closed_loop import closed_loop
 from lie_codegen.control.loop_kernels import loop_step
+from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.studies.distributions import Distribution, Normal, OnGroup, Uniform
 from lie_codegen.studies.space import Space

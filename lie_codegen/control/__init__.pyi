@@ -8,7 +8,6 @@ from .attitude import gains_for_response as gains_for_response
 from .attitude_law import attitude_law as attitude_law
 from .certificate import certificate as certificate
 from .certificate_record import Certificate as Certificate
-from .closed_loop import ClosedLoop as ClosedLoop
 from .closed_loop import closed_loop as closed_loop
 from .closed_loop_package import generate_closed_loop as generate_closed_loop
 from .compatibility import check_compatibility as check_compatibility
@@ -22,6 +21,7 @@ from .law_file import read_law as read_law
 from .linearisation import linear_loop as linear_loop
 from .linearisation import rigid_gains as rigid_gains
 from .loop_margins import loop_margins as loop_margins
+from .loop_result import ClosedLoop as ClosedLoop
 from .manifold import manifold as manifold
 from .manifold_law import manifold_law as manifold_law
 from .observer import observer as observer

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lie_codegen.control.closed_loop import ClosedLoop, closed_loop
+from lie_codegen.control.closed_loop import closed_loop
+from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.control.reference_kernels import ReferenceBody
 from lie_codegen.control.reference_motion import FormulaReference, formula_reference
 from lie_codegen.control.tracking_law import tracking_law

@@ -13,7 +13,7 @@ import numpy as np
 
 from lie_codegen.averaging.averaged import Averaged
 from lie_codegen.codegen.templates import template_folder
-from lie_codegen.control.closed_loop import ClosedLoop
+from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.errors import InputError, write_refusal
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
