@@ -44,7 +44,7 @@ __all__ = ["PeriodicInput"]
 Pieces = tuple[tuple[Any, tuple[Any, ...]], ...]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class PeriodicInput(Saved):
     """u(t) with u(t + T) = u(t), callable: u(t) is (n,) for a scalar t and (..., n) for an array.
 
@@ -61,6 +61,8 @@ class PeriodicInput(Saved):
         pieces: of an input in pieces, (end, formulas) of each.
         table: of a function, the edges of panels of [0, T] and its values at their Chebyshev nodes. They stand for the function in
             comparisons, and in a pickle or a file: the copy interpolates, to rounding where the function is smooth.
+        function: that function, where it is known.
+        waveform: what averages are derived from; made from the formulas if not given.
 
     Raises:
         ExpressionError: a text outside the grammar, with the column.
@@ -76,18 +78,33 @@ class PeriodicInput(Saved):
     pieces: Pieces = field(default=(), repr=False)
     table: tuple[Array, ...] = field(default=(), repr=False)
 
-    def __post_init__(self) -> None:
-        given = vars(self)["components"]
+    def __init__(
+        self,
+        components: Sequence[Any],
+        period: Any = None,
+        parameters: Sequence[str] = (),
+        breakpoints: Sequence[float] = (),
+        waveform: Waveform | None = None,
+        pieces: Pieces = (),
+        table: tuple[Array, ...] = (),
+        function: Any = None,
+    ) -> None:
+        given: Any = components
         if given is None or isinstance(given, str) or _is_expression(given):
             raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {given!r}")
-        names = (self.parameters,) if isinstance(self.parameters, str) else tuple(self.parameters)
         settle(
             self,
             components=given if isinstance(given, _Seen) else tuple(given),
-            parameters=names,
-            breakpoints=tuple(sorted(float(b) for b in self.breakpoints)),
-            _given=vars(self)["period"],
+            period=period,
+            parameters=(parameters,) if isinstance(parameters, str) else tuple(parameters),
+            breakpoints=tuple(sorted(float(b) for b in breakpoints)),
+            pieces=pieces,
+            table=table,
+            function=function,
+            _given=period,
         )
+        if waveform is not None:
+            settle(self, waveform=waveform, _numbers=numbers_of(waveform, tuple(self.breakpoints)))
         if isinstance(given, _Seen):
             settle(self, _numbers=given.numbers, waveform=Later(given.waveform))
             return
