@@ -82,7 +82,8 @@ class Body:
 @lru_cache(maxsize=1)
 def _turning() -> LieAlgebra:
     """[a, b] = a x b: angular velocities in body axes."""
-    return LieAlgebra("cross", ("x", "y", "z"), {(0, 1): {2: 1}, (0, 2): {1: -1}, (1, 2): {0: 1}})
+    one = sp.Integer(1)  # structure constants are exact numbers
+    return LieAlgebra("cross", ("x", "y", "z"), {(0, 1): {2: one}, (0, 2): {1: -one}, (1, 2): {0: one}})
 
 
 def turned(ops: Arithmetic, theta: Vector, G: Vector) -> Vector:
