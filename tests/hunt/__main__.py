@@ -17,6 +17,7 @@ from pathlib import Path
 from tests.hunt import (
     analysers,
     faults,
+    fuzz,
     generated_c,
     growth,
     hostile,
@@ -48,6 +49,14 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
         found["calls of the C steering solver with unusable arguments, under ASan and UBSan"] = lambda: (
             solver_arguments.hunt(home / "solver")
         )
+    if fuzz.has_fuzzer():
+        for target in fuzz.TARGETS:
+            found[f"inputs that libFuzzer makes for the C of {target}, under ASan and UBSan"] = lambda target=target: (
+                fuzz.hunt(home / "fuzz" / target, target, 10 * scale)
+            )
+    if fuzz.has_atheris():
+        for kind in fuzz.TEXTS:
+            found[f"{kind} that atheris makes"] = lambda kind=kind: fuzz.hunt_texts(kind, 10 * scale)
     found["faults injected: n-th write, rename, fork, lock refused, full or killed"] = lambda: faults.hunt(12 * scale)
     found["kills among eight processes on one cache with tiny limits"] = lambda: faults.kills(20 * scale)
     found["kills of processes that write a package and a plan"] = lambda: growth.torn_writes(20 * scale)

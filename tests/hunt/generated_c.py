@@ -82,10 +82,7 @@ CALLS
 
 
 def _call(kernel: Kernel) -> str:
-    sizes = [
-        ", ".join(str(port.size * (2 if port.is_complex else 1)) for port in ports)
-        for ports in (kernel.inputs, kernel.outputs)
-    ]
+    sizes = [", ".join(str(port.size) for port in ports) for ports in (kernel.inputs, kernel.outputs)]
     return (
         f"    {{ const ptrdiff_t a[] = {{{sizes[0]}}}, b[] = {{{sizes[1]}}}; "
         f"exercise({kernel.symbol}_batch, a, {len(kernel.inputs)}, b, {len(kernel.outputs)}); }}"

@@ -5,9 +5,11 @@ A call may succeed, or raise an error of ours. Anything else is a find: another 
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import random
 import signal
+import tempfile
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
@@ -169,7 +171,14 @@ def try_function(function: Any, parameter: str, value: str, seconds: float = 5.0
 
 def hunt(share: float, seed: int = 0, seconds: float = 5.0) -> tuple[int, list[str]]:
     """(calls tried, finds) over a share of all calls of the front door."""
-    rng = random.Random(seed)
+    with (
+        tempfile.TemporaryDirectory(prefix="hunt-") as folder,
+        contextlib.chdir(folder),
+    ):  # a text may be taken for a file
+        return _hunt(random.Random(seed), share, seconds)
+
+
+def _hunt(rng: random.Random, share: float, seconds: float) -> tuple[int, list[str]]:
     tried, found = 0, []
     for name, function in public_functions():
         for parameter, value in attempts(function):

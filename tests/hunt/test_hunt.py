@@ -10,6 +10,7 @@ from tests.hunt import __main__ as whole
 from tests.hunt import (
     analysers,
     faults,
+    fuzz,
     generated_c,
     growth,
     hostile,
@@ -87,6 +88,15 @@ def test_generated_c_has_no_warning_to_give(tmp_path: Path, monkeypatch: pytest.
     tried, found = warnings_matrix.hunt(tmp_path)
     assert tried >= 6
     assert not found, "\n".join(found)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not fuzz.has_fuzzer(), reason="no clang with its fuzzer")
+def test_the_fuzzer_finds_nothing_and_keeps_what_it_needs(tmp_path: Path) -> None:
+    for target in fuzz.TARGETS:
+        tried, found = fuzz.hunt(tmp_path / target, target, 5)
+        assert tried > len(fuzz.kept(target)) > 0
+        assert not found, "\n".join(found)
 
 
 @pytest.mark.slow
