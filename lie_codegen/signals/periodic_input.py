@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,7 +57,6 @@ class PeriodicInput(Saved):
         period: T as a text, a number or a SymPy expression; the smallest common period if not given. [time unit]
         parameters: names of symbolic amplitudes and phases.
         breakpoints: times in (0, T) at which u or a derivative jumps.
-        waveform: what averages are derived from: exact trigonometric polynomials, pieces of such, or values; follows from the others.
         pieces: of an input in pieces, (end, formulas) of each.
         table: of a function, the edges of panels of [0, T] and its values at their Chebyshev nodes. They stand for the function in
             comparisons, and in a pickle or a file: the copy interpolates, to rounding where the function is smooth.
@@ -74,9 +73,9 @@ class PeriodicInput(Saved):
     period: Any = Deferred(None)
     parameters: Sequence[str] = ()
     breakpoints: Sequence[float] = ()
-    waveform: Waveform = field(default=Deferred(), repr=False, compare=False, metadata={"derived": True})  # type: ignore[assignment]
     pieces: Pieces = field(default=(), repr=False)
     table: tuple[Array, ...] = field(default=(), repr=False)
+    function: Any = field(default=None, repr=False, compare=False, metadata={"derived": True})
 
     def __init__(
         self,
@@ -106,11 +105,8 @@ class PeriodicInput(Saved):
         if waveform is not None:
             settle(self, waveform=waveform, _numbers=numbers_of(waveform, tuple(self.breakpoints)))
         if isinstance(given, _Seen):
-            settle(self, _numbers=given.numbers, waveform=Later(given.waveform))
+            settle(self, _numbers=given.numbers, _derive=given.waveform)
             return
-        # Only a function says more than the other fields do; what they determine is never taken from a caller.
-        if not (self.table and isinstance(vars(self)["waveform"], SampledWaveform)):
-            settle(self, waveform=Later(self._made))
         _ = self._numbers  # refuses what is no input
         settle(self, period=Later(lambda: self.waveform.period))
 
@@ -126,8 +122,11 @@ class PeriodicInput(Saved):
 
         return made() if source is None else recalled_numbers(source, made)
 
-    def _made(self) -> Waveform:
-        """The waveform, from pieces, a table or formulas."""
+    @cached_property
+    def waveform(self) -> Waveform:
+        """What averages are derived from: exact trigonometric polynomials, pieces of such, or values."""
+        if "_derive" in vars(self):
+            return cast(Waveform, vars(self)["_derive"]())
         if self.pieces:
             symbols = {name: symbol_of(name) for name in self.parameters}
             ends = [number_of(end, "the end of a piece", {}) for end, _ in self.pieces]
@@ -135,7 +134,8 @@ class PeriodicInput(Saved):
             return piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
         if self.table:
             panels, values = Panels(self.table[0]), self.table[1]
-            return SampledWaveform(panels, values, Interpolated(panels, values), period_of(self._given_period, {}))
+            function = self.function or Interpolated(panels, values)
+            return SampledWaveform(panels, values, function, period_of(self._given_period, {}))
         return formula_waveform(self.components, self._given_period, self.parameters, self.breakpoints)
 
     @property
@@ -196,8 +196,7 @@ class PeriodicInput(Saved):
 
         panels, values = resolve(doubles, length, breakpoints)
         names = ("a function",) * probe.shape[1]
-        waveform = SampledWaveform(panels, values, doubles, exact)
-        return PeriodicInput(names, exact, (), tuple(breakpoints), waveform, table=(panels.edges, values))
+        return PeriodicInput(names, exact, (), tuple(breakpoints), table=(panels.edges, values), function=doubles)
 
     @staticmethod
     def from_samples(values: ArrayLike, period: Any) -> PeriodicInput:
