@@ -98,6 +98,7 @@ from .groups import build as build
 from .groups import cartan_involution as cartan_involution
 from .groups import change_of_basis as change_of_basis
 from .groups import chart_domain as chart_domain
+from .groups import chart_margin as chart_margin
 from .groups import commutator_free_step as commutator_free_step
 from .groups import controllability as controllability
 from .groups import covariance_kernels as covariance_kernels
@@ -128,6 +129,7 @@ from .groups import tangent_to as tangent_to
 from .groups import torch_function as torch_function
 from .groups import transition_step as transition_step
 from .groups import wei_norman as wei_norman
+from .groups import wei_norman_determinant as wei_norman_determinant
 from .groups import wei_norman_order as wei_norman_order
 from .groups import wei_norman_step as wei_norman_step
 from .groups import with_quaternion as with_quaternion

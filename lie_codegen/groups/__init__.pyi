@@ -37,5 +37,7 @@ from .second_derivative import hessian as hessian
 from .structure import structure as structure
 from .transition_step import transition_step as transition_step
 from .wei_norman.chart_domain import chart_domain as chart_domain
+from .wei_norman.chart_kernels import chart_margin as chart_margin
+from .wei_norman.chart_kernels import wei_norman_determinant as wei_norman_determinant
 from .wei_norman.matrix import wei_norman as wei_norman
 from .wei_norman.order import wei_norman_order as wei_norman_order

@@ -76,6 +76,7 @@ MADE: dict[str, tuple[Callable[[Any], Any], Sequence[Any]]] = {
     "allocation_kernel": (lambda k: lc.allocation_kernel(lc.allocate(np.eye(3, 4) + k)), (0.1, 0.2)),
     "attitude_law": (lambda k: lc.attitude_law(k_p=k), (1, 2)),
     "averaged_kernels": (lambda k: lc.averaged_kernels(lc.average("so3", circles(k), 2)), ("2", "1/3")),
+    "chart_margin": (lc.chart_margin, ("so3", "se2")),
     "commutator_free_step": (lc.commutator_free_step, ("so3", "se2")),
     "compensated": (lambda m: lc.compensated(lc.tracking_law("se3", inertia=1, error="se3_4", gains={"K_1": 1, "K_2": 1, "K_d": 1}), vehicle(m)), (1, 2)),
     "covariance_kernels": (lc.covariance_kernels, ("so3", "se2")),
@@ -107,6 +108,7 @@ MADE: dict[str, tuple[Callable[[Any], Any], Sequence[Any]]] = {
     "vibrational_kernels": (lambda g: lc.vibrational_kernels(lc.vibrational_fields(pendulum(g), lc.PeriodicInput(["cos(t)"])), "vib"), ("1/3", "2")),
     "vibrational kernels of two links": (lambda m: lc.vibrational_kernels(lc.vibrational_fields(two_links(m), lc.PeriodicInput(["cos(t)"])), "vib"), ("2", "3")),
     "wei_norman_step": (lc.wei_norman_step, ("so3", "se2")),
+    "wei_norman_determinant": (lc.wei_norman_determinant, ("so3", "se2")),
     "with_quaternion": (lambda k: lc.with_quaternion(lc.attitude_law(k_p=k), order="scalar_first"), (1, 2)),
     # kernels of results
     "adaptive_law": (lambda k: lc.adaptive_law("so3", error="so3_right", gains={"K_p": k, "K_d": 5}), (1, 2)),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.wei_norman import body as wei_norman_body
 from lie_codegen.groups.wei_norman.chart_domain import chart_domain
 from lie_codegen.groups.wei_norman.matrix import wei_norman
@@ -20,9 +20,15 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.on_demand import sympy as sp
 
 
-@kernel_factory()
-def wei_norman_determinant(group: MatrixGroup, name: str = "wei_norman_determinant") -> Kernel:
-    """g -> det M(g)^{-1}, from its factored form; 1 at g = 0, and the chart ends where it vanishes."""
+@kernel_factory(group=as_group)
+def wei_norman_determinant(group: GroupLike, name: str = "wei_norman_determinant") -> Kernel:
+    """g -> det M(g)^{-1}, from its factored form; 1 at g = 0, and the chart ends where it vanishes.
+
+    Args:
+        group: object, catalogue name or file.
+        name: C identifier.
+    """
+    group = as_group(group)
     wn = wei_norman(group)
     return Kernel(
         name=name,
@@ -35,13 +41,18 @@ def wei_norman_determinant(group: MatrixGroup, name: str = "wei_norman_determina
     )
 
 
-@kernel_factory()
-def chart_margin(group: MatrixGroup, name: str = "chart_margin") -> Kernel:
+@kernel_factory(group=as_group)
+def chart_margin(group: GroupLike, name: str = "chart_margin") -> Kernel:
     """g -> margin, 1 at g = 0 and 0 at the edge of the chart, by which a simulation decides to restart it.
 
     Product of the walls, each 1 at g = 0; times sqrt(n) / |M(g)| (Frobenius) where an escape is possible. Constant 1 on a
     global chart. By left invariance a restart is X = X_k Phi(g) with g = 0 at t_k.
+
+    Args:
+        group: object, catalogue name or file.
+        name: C identifier.
     """
+    group = as_group(group)
     domain = chart_domain(group)
     wn = wei_norman(group)
     origin = dict.fromkeys(wn.g, 0)
