@@ -92,15 +92,20 @@ def errors() -> str:
         "# Errors and warnings, with their cures",
         "",
         "An `InputError` says what was given wrongly (exit status 2), a `ComputationError` what failed (1). Every message says what, where and how",
-        "to mend it; the last column is what helps most often.",
+        "to mend it; the cure is what helps most often.",
         "",
-        "| name | is a | says | cure |",
-        "|---|---|---|---|",
     ]
     for value in found:
-        said = " ".join((inspect.getdoc(value) or "").split()).replace("|", "\\|")
-        lines.append(f"| `{value.__name__}` | `{value.__mro__[1].__name__}` | {said} | {CURES[value.__name__]} |")
-    return "\n".join(lines) + "\n"
+        said = " ".join((inspect.getdoc(value) or "").split())
+        lines += [
+            f"## `{value.__name__}`",
+            "",
+            f"{said} ({value.__mro__[1].__name__})",
+            "",
+            f"**Cure:** {CURES[value.__name__]}.",
+            "",
+        ]
+    return "\n".join(lines)
 
 
 def command_line() -> str:

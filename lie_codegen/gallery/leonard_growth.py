@@ -76,10 +76,10 @@ def _seconds(chosen: Any, u: PeriodicInput, order: int) -> float:
 def _draw(seconds: dict[str, list[float]]) -> Any:
     figure = new_figure(9, 6)
     axes = figure.subplots()
+    figure.suptitle("Exact averages: time of $F_1 \\ldots F_p$ on one core")
     for (label, row), colour in zip(seconds.items(), SEQUENCE, strict=False):
         axes.semilogy(range(1, len(row) + 1), row, "o-", color=colour, mfc="none", ms=4, label=label)
     axes.set(
-        title="Exact averages: time of $F_1 \\ldots F_p$ on one core",
         xlabel="order p",
         ylabel="processor time [s]",
         xticks=range(1, 13),

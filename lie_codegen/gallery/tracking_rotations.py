@@ -66,7 +66,7 @@ def _draw(R_d: NDArray[Any], runs: dict[str, ClosedLoop]) -> Any:
         axes.text(-1.0, -1.45 * level, label, ha="right", va="center", fontsize=11)
     for number in range(9):
         axes.text(1.5 * number, 0.85, f"{10 * number / 8:.3g} s", ha="center", color=GREY)
-    axes.set(aspect="equal", xlim=(-3.4, 13), ylim=(-3.8, 1.1))
+    axes.set(aspect="equal", xlim=(-3.9, 13), ylim=(-3.8, 1.1))
     axes.axis("off")
     caption(
         figure,
