@@ -66,9 +66,13 @@ def _tree(value: Any) -> list[Any]:
         return ["symbol", value.name]
     if not value.args:
         return ["number", str(value)]
-    node = value.func.__name__
-    if node not in _NODES and node not in FORMULA_FUNCTIONS:
-        raise InputError(f"a formula has no {node}")
+    own = value.func.__name__
+    # by the grammar's name, which need not be SymPy's: abs is its Abs
+    node = (
+        own if own in _NODES else next((name for name, made in FORMULA_FUNCTIONS.items() if made is value.func), None)
+    )
+    if node is None:
+        raise InputError(f"a formula has no {own}")
     return [node, *map(_tree, value.args)]
 
 
