@@ -19,6 +19,7 @@ class PackageParts:
     schedule: of a closed loop, in what order a unit calls its functions: symbols "step", "control" and "reference" ("" where there is
         none); "stages" of the reference a step; seconds "period" between steps at most, "sample" between calls of the law (0: at every
         stage); "delay" in samples, "command" its doubles; "input", the port that the simulator gives: the others are parameters.
+    has_forms: whether there are several ways to store it, of which `form` is one.
     """
 
     namespace: str
@@ -26,6 +27,7 @@ class PackageParts:
     files: Mapping[str, str] = field(default_factory=dict)
     starts: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
     schedule: Mapping[str, str | int | float] = field(default_factory=dict)
+    has_forms: bool = False
 
 
 @runtime_checkable

@@ -184,6 +184,18 @@ def closed_loop(
         known = set(inspect.signature(closed_loop).parameters) - {"unknown"}
         raise InputError(unknown_keywords("closed_loop", unknown, known))
     if mpc is not None:
+        of_law = {
+            "group": group, "law": law, "inertia": inertia, "gains": gains, "reference": reference, "xi0": xi0, "rtol": rtol,
+            "step": step, "sample": sample, "limits": limits, "disturbance": disturbance, "observer": observer, "states": states,
+            "external": external, "tolerance": tolerance, "order": order, "first": first or None, "events": events or None,
+            "threads": None if threads == 1 else threads, "method": None if method == "auto" else method,
+        }  # fmt: skip
+        stray = [name for name, value in of_law.items() if value is not None]
+        if stray:
+            raise InputError(
+                f"closed_loop: {', '.join(stray)} beside mpc=; the controller brings its group, sample and limits, and the body is "
+                "its problem or plant="
+            )
         given = {
             "values": values, "plant": plant, "plant_values": plant_values, "noise": noise, "delay": delay,
             "compensate": compensate, "substeps": substeps, "seed": seed, "runs": runs,
@@ -208,6 +220,10 @@ def closed_loop(
         group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step, sample=sample,
         delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains, order=order,
     )  # fmt: skip
+    if order is not None and law is None:
+        raise InputError(
+            "closed_loop: order says what a law commands, and there is none: give law=, or leave order away"
+        )
     if method not in ("auto", "gauss"):
         raise InputError(f'closed_loop: method is "auto" or "gauss", given {method!r}')
     by_rate = told.kind == "continuous" and (told.step is None or method == "gauss")

@@ -71,8 +71,8 @@ def simulate(
             given. No reading sees a pulse between its values: give the width of the shortest.
         method: "auto" (Magnus of order 8, 6 above rtol = 1e-7), "magnus8", "magnus6", "magnus4", "rkmk4" (Munthe-Kaas) or
             "commutator_free" (two exponentials, no brackets).
-        steps: so many equal steps, more where they have to end at a time of t or a jump of u; no tolerance then.
-            For the Magnus methods.
+        steps: so many equal steps, more where they have to end at a time of t or a jump of u; no tolerance then: rtol says
+            which order "auto" takes and how finely a function u is read, atol is refused. For the Magnus methods.
         events: `lc.Event`s to be found along one trajectory.
         threads: over which N trajectories, or the steps of one, are shared out.
 
@@ -87,6 +87,10 @@ def simulate(
     goal = check_tolerance(f"simulate({group.name})", rtol, atol, tolerance)
     if method not in METHODS:
         raise InputError(f"simulate({group.name}): method is one of {', '.join(METHODS)}; given {method!r}")
+    if steps is not None and atol:
+        raise InputError(
+            f"simulate({group.name}): atol goes with steps that are chosen by it; give steps or atol, not both"
+        )
     start = _initial(group, X0)
     law = as_feedback(group, u)
     if law is not None:

@@ -54,14 +54,15 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name
             when the cache has it, or the package brings the C sources), a Kernel, or several of all these. Kernels of two
             namespaces with one name go by their symbols (lib.so3_exp, lib.se3_exp).
         kernels: names to have compiled before this returns, side by side on the processor's cores; "all" for every one.
-        name: C identifier of a library of kernels; their namespaces if None.
+        name: C identifier by which the library is called; the namespaces of its kernels if None. As with `generate`, the
+            symbols of the kernels stay theirs.
 
     Raises:
         InputError: if it is none of these, two kernels have one symbol, or `kernels` names one that there is not.
         CompileError: with the command and the compiler's own words; for a group when the kernel is asked for.
     """
     if isinstance(what, str | Path):
-        library = _build_named(what)
+        library = _build_named(what, name)
     else:
         group, given = _group_or_kernels(what)
         if group is None:
@@ -72,8 +73,7 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name
             whole.made_by(_build_kernels, given, name)
             whole.compiled_from(lambda asked: next(each for each in given if asked in (each.name, each.symbol)))
             return whole
-        library = group_library(object_definition(group), lambda: group)
-        library.made_by(build, group)
+        library = _build_group(group, name)
     library.compile(library.kernels if kernels == "all" else kernels)
     return library
 
@@ -128,6 +128,10 @@ def generate(
         # a controller of a floor above this one says itself what it is as C
         if steering is not None:
             raise InputError("generate: steering needs a group, not a controller")
+        if form is not None:
+            raise InputError("generate: form says how the controls of a plan are stored, and a controller has none")
+        if name is not None:
+            raise InputError("generate: a controller bears the name of its problem; give name= to lc.ocp")
         if target != "c":
             raise InputError(f"generate: a controller is written as C, not for {target}")
         return write_package(render(real=real), folder)
@@ -140,6 +144,10 @@ def generate(
     if (current := current_package(key, folder)) is not None:
         return current
     groups, kernels, parts = _gathered(plain, parted, name, real, form)
+    if form is not None and not any(each.has_forms for each in parts):
+        raise InputError(
+            "generate: form says how the controls of a plan are stored; a closed loop and wheels have none"
+        )
     if steering is not None and len(groups) != 1:
         raise InputError(f"generate: steering needs one group, and {len(groups)} are given")
     files = {path: text for each in parts for path, text in each.files.items()}
@@ -248,13 +256,19 @@ def object_definition(group: MatrixGroup) -> str:
     return f"group\n{group.definition_text}"
 
 
-def _build_named(what: str | Path) -> GroupLibrary:
+def _build_group(group: MatrixGroup, name: str | None) -> GroupLibrary:
+    library = group_library(object_definition(group), lambda: group, name)
+    library.made_by(_build_group, group, name)
+    return library
+
+
+def _build_named(what: str | Path, name: str | None) -> GroupLibrary:
     from lie_codegen.groups.catalogue_names import definition_source
 
-    return _build_source(str(what), definition_source(what))
+    return _build_source(str(what), definition_source(what), name)
 
 
-def _build_source(what: str, source: bytes) -> GroupLibrary:
+def _build_source(what: str, source: bytes, name: str | None = None) -> GroupLibrary:
     """The group of the text of a catalogue entry or a file: a file itself need not be where the library is made again."""
 
     def load() -> MatrixGroup:
@@ -262,8 +276,8 @@ def _build_source(what: str, source: bytes) -> GroupLibrary:
 
         return group_of_source(what, source)
 
-    library = group_library(source_definition(source), load)
-    library.made_by(_build_source, str(what), source)
+    library = group_library(source_definition(source), load, name)
+    library.made_by(_build_source, str(what), source, name)
     return library
 
 

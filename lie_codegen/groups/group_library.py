@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from lie_codegen.door import on_behalf
 from lie_codegen.groups.prebuilt import Prebuilt, find_prebuilt
+from lie_codegen.identifiers import check_identifier
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.build import build_sources, interpreted
 from lie_codegen.runtime.cache_folder import usable_folder
@@ -152,30 +153,34 @@ class GroupLibrary(Library):
                 made.result()
 
 
-def group_library(definition: str, load: Callable[[], MatrixGroup]) -> GroupLibrary:
-    """The library of the group that `load` makes; `definition` determines it.
+def group_library(definition: str, load: Callable[[], MatrixGroup], name: str | None = None) -> GroupLibrary:
+    """The library of the group that `load` makes; `definition` determines it. It is called `name`, or as the group.
 
     Raises:
+        IdentifierError: the name is no C identifier.
         InputError: the definition is not one of a group.
         CacheError: there is no folder to build in.
     """
     origin = GroupSources(definition, load)
+    if name is not None:
+        check_identifier(name, "name")
     compilers = find_compilers()
     if not compilers:
         warn_no_compiler()
-        library = GroupLibrary(*origin.names(), lambda name: interpreted([origin.kernel(name)]), None)
+        namespace, kernels = origin.names()
+        library = GroupLibrary(name or namespace, kernels, lambda each: interpreted([origin.kernel(each)]), None)
         library.compiled_from(origin.kernel)
         return library
     folder = usable_folder()
     prepare_extension()
     namespace, kernels = _known_names(folder, origin)
 
-    def make(name: str) -> Library:
+    def make(kernel: str) -> Library:
         return build_sources(
-            lambda: origin.sources(name), compilers, definition=f"{definition}\nkernel {name}", namespace=namespace
+            lambda: origin.sources(kernel), compilers, definition=f"{definition}\nkernel {kernel}", namespace=namespace
         )
 
-    library = GroupLibrary(namespace, kernels, make, folder / "entries")
+    library = GroupLibrary(name or namespace, kernels, make, folder / "entries")
     library.compiled_from(origin.kernel)
     return library
 

@@ -28,6 +28,8 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
     given = {name for name, value in options.items() if value is not None}
     if given & _DIRECT or options.get("objective") == "fuel":
         return True
+    if options.get("objective") == "time" and "guess" in given:
+        return False  # arcs of least time start from words; the transcription follows the guess
     if isinstance(target, GoalSet):
         return _only_direct(given)  # what it has no option for goes to a method that moves along the set
     if given & {"start", "guess"} and _only_direct(given):

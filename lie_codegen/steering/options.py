@@ -16,16 +16,25 @@ _WHOLE = (
 _MOST = 1_000_000
 _YES_OR_NO = ("rest", "periodic", "polish", "exact", "compare")
 _TEXTS = ("objective", "dynamics", "equation", "solver", "quadrature", "integrator", "form", "amplitude", "planner")
+#: Options that mean something only beside another one: that one, and what to give.
+_BESIDE = {
+    "longest": ("objective", "time", 'the longest duration of objective="time"'),
+    "vertices": ("objective", "time", 'the controls of arcs of objective="time"'),
+    "classes": ("obstacles", None, "the number of ways between obstacles="),
+}
 #: Methods that take a drift that depends on time.
 _TIMED_DRIFT = ("auto", "direct")
 
 
 def check_options(where: str, method: str, options: Mapping[str, Any]) -> None:
-    """Whole numbers are whole, switches are True or False, names are texts; a drift of time is for the direct method.
+    """Whole numbers are whole, switches are True or False, names are texts; a drift of time is for the direct method; none is without effect.
 
     Raises:
         SteeringInputError: naming the option and what it takes.
     """
+    for name, (other, wanted, meaning) in _BESIDE.items():
+        if name in options and (other not in options or (wanted is not None and options[other] != wanted)):
+            raise SteeringInputError(f"{where}: {name} is {meaning}; give that too, or leave {name} away")
     for name, value in options.items():
         if name in _WHOLE and not _is_whole(value):
             raise SteeringInputError(f"{where}: {name} is a whole number, got {value!r:.60}")

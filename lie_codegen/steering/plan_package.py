@@ -76,7 +76,7 @@ def plan_parts(plan: Plan, name: str | None, real: str, form: str = "auto") -> P
         f"src/{view.prefix}.c": render("plan_source.c.jinja", plan=view),
         f"{view.prefix}_replay.c": render("plan_replay.c.jinja", plan=view),
     }
-    return PackageParts(package, (step,), files)
+    return PackageParts(package, (step,), files, has_forms=True)
 
 
 def _view(plan: Plan, table: PlanTable, package: str, real: str) -> PlanView:

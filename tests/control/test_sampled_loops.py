@@ -225,6 +225,7 @@ def test_disturbances_as_formulas_constants_and_kernels() -> None:
         ({"reference": 3}, "reference is what lc.reference makes"),
         ({"substeps": 3}, "substeps without mpc="),
         ({"threads": 0}, "threads"),
+        ({"law": None, "order": 2}, "order says what a law commands"),
     ],
     ids=lambda each: "",
 )

@@ -199,6 +199,7 @@ def test_texts_where_numbers_belong_are_named() -> None:
         (np.zeros(3), {"t": "x"}, "array of numbers"),
         (np.zeros(3), {"t": [0, 1], "eps": "x"}, "eps is 'x'"),
         (np.zeros(3), {"t": [0, 1], "X0": "x"}, "array of numbers"),
+        (np.zeros(3), {"t": [0, 1], "steps": 4, "atol": 1e-6}, "steps or atol, not both"),
     ):
         with pytest.raises(InputError, match=words):
             lc.simulate(so3, u, **named)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -74,6 +75,23 @@ def test_a_library_of_several_namespaces() -> None:
         lc.build([law("soft", 4), law("soft", 5)])
     with pytest.raises(lc.errors.IdentifierError):
         lc.build(law("soft", 4), name="no name")
+
+
+def test_the_library_of_a_group_is_called_as_asked(tmp_path: Path) -> None:
+    """As in the package of that name: the header bears it, the symbols stay the group's."""
+    for what in ("so3", lc.group("so3")):
+        lib = lc.build(what, name="flight")
+        plain = lc.build(what)
+        assert (lib.namespace, plain.namespace) == ("flight", "so3")
+        assert "library flight:" in repr(lib)
+        assert lib != plain
+        again = pickle.loads(pickle.dumps(lib))
+        assert (again, again.namespace) == (lib, "flight")
+        np.testing.assert_array_equal(lib.exp([0.1, 0.2, 0.3]), plain.exp([0.1, 0.2, 0.3]))
+        with pytest.raises(lc.errors.IdentifierError):
+            lc.build(what, name="no name")
+    header = lc.generate("so3", tmp_path / "flight", name="flight") / "include" / "flight.h"
+    assert "so3_exp(" in header.read_text()
 
 
 def test_a_current_folder_is_left_alone(tmp_path: Path) -> None:

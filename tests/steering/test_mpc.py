@@ -286,6 +286,21 @@ def test_the_loop_of_the_front_door_with_noise_and_delay_is_reproducible() -> No
     assert lc.closed_loop(mpc=controller, t=t, noise=0.0, delay=2).cost <= late.cost
 
 
+@pytest.mark.parametrize(
+    "stray",
+    [
+        {"group": "so3"}, {"law": lc.attitude_law("p")}, {"inertia": 1}, {"xi0": np.zeros(3)}, {"limits": 1}, {"rtol": 1e-6},
+        {"step": 0.1}, {"sample": 0.1}, {"method": "gauss"}, {"first": 2}, {"threads": 2}, {"disturbance": (1, 0, 0)},
+    ],
+    ids=lambda each: next(iter(each)),
+)  # fmt: skip
+def test_what_a_controller_brings_itself_is_refused_beside_it(stray: dict[str, Any]) -> None:
+    controller = lc.mpc(regulator())
+    controller.reset(X0=np.eye(3), q=2.0, Xd=np.eye(3))
+    with pytest.raises(InputError, match=f"{next(iter(stray))} beside mpc="):
+        lc.closed_loop(mpc=controller, t=[0, 1], **stray)
+
+
 def test_a_plant_of_ones_own() -> None:
     controller = lc.mpc(regulator())
     controller.reset(X0=np.eye(3), q=2.0, Xd=rotation((0, 1.0, 0)))
@@ -425,6 +440,10 @@ def test_packages_are_refused_where_they_cannot_be(tmp_path: Path) -> None:
         lc.generate(controller, tmp_path / "package", real="half")
     with pytest.raises(InputError, match="steering"):
         lc.generate(controller, tmp_path / "package", steering=True)
+    with pytest.raises(InputError, match=r"name= to lc\.ocp"):
+        lc.generate(controller, tmp_path / "package", name="mine")
+    with pytest.raises(InputError, match="a controller has none"):
+        lc.generate(controller, tmp_path / "package", form="table")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "file").write_text("mine")
     with pytest.raises(OutputFolderError):

@@ -106,6 +106,9 @@ def test_forms(tmp_path: Path) -> None:
         lc.generate(plan, tmp_path / "no", form="splines")
     with pytest.raises(InputError, match="no plan is given"):
         lc.generate("so3", tmp_path / "no", form="table")
+    loop = lc.closed_loop("so3", law=lc.attitude_law("p"), t=[0, 1])
+    with pytest.raises(InputError, match="a closed loop and wheels have none"):
+        lc.generate(loop, tmp_path / "no", form="table")
     assert not (tmp_path / "no").exists()
 
 

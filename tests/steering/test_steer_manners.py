@@ -27,11 +27,26 @@ TASK = ("so3", [0.1, 0.2, 0.3], ("w1", "w2"), 1.0)
         ({"solver": 3}, "is a text"),
         ({"method": "transcription", "drift": lambda t: [0, 0, 0]}, "constant drift"),
         ({"obstacles": lc.Cone((0, 0, 1), (1, 0, 0), 0.3)}, r"obstacles=\[Cone"),
+        ({"longest": 2}, 'longest is the longest duration of objective="time"'),
+        ({"objective": "energy", "vertices": [(1, 1)]}, "vertices is"),
+        ({"method": "transcription", "classes": 2}, "classes is the number of ways between"),
+        ({"objective": "time", "bounds": 1, "pieces": 8, "polish": True}, "pieces, polish has no effect on least time"),
+        ({"bounds": 1, "objective": "fuel", "spread": [{"gain": 1.1}]}, "objective has no effect beside spread="),
     ],
 )
-def test_options_of_the_wrong_kind_are_named(options: dict[str, object], words: str) -> None:
+def test_options_of_the_wrong_kind_or_without_effect_are_named(options: dict[str, object], words: str) -> None:
     with pytest.raises(lc.errors.SteeringInputError, match=words):
         lc.steer(*TASK, **options)  # type: ignore[arg-type]
+
+
+def test_a_guess_of_least_time_is_followed() -> None:
+    """By the transcription: arcs of least time start from words."""
+    guess = lc.steer(*TASK)
+    plan = lc.steer(*TASK, objective="time", bounds=1, guess=guess, intervals=12, starts=1)
+    assert plan.method == "transcription"
+    assert plan.error < 1e-6
+    with pytest.raises(lc.errors.SteeringInputError, match="follows a guess"):
+        lc.steer(*TASK, method="direct", objective="time", bounds=1, guess=guess)
 
 
 def test_a_law_is_a_kernel() -> None:

@@ -10,6 +10,18 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.direct.method import direct
 from lie_codegen.steering.plan import Plan
 
+#: Options of the direct method that a way of it does not read.
+_IDLE = {
+    "time": (
+        ("weights", "guess", "spread", "pieces", "polish"),
+        'on least time by arcs of method="direct"; leave it away (method="transcription" follows a guess)',
+    ),
+    "spread": (
+        ("weights", "objective", "rounds", "polish"),
+        "beside spread=, whose controls have least squared errors; leave it away",
+    ),
+}
+
 
 def direct_plan(
     group: MatrixGroup,
@@ -29,6 +41,7 @@ def direct_plan(
         return _torques(group, target, controls, duration, tolerance, options)
     known = direct_options()
     _refuse_others("direct", known, options)
+    _refuse_idle(f"steer({group.name})", options)
     return direct(group, target, controls, duration, tolerance=tolerance, **options)
 
 
@@ -50,6 +63,14 @@ def _refuse_others(what: str, known: set[str], options: Mapping[str, Any]) -> No
     unknown = sorted(set(options) - known)
     if unknown:
         raise SteeringInputError(f"{what} has no option {', '.join(unknown)}; it has {', '.join(sorted(known))}")
+
+
+def _refuse_idle(where: str, options: Mapping[str, Any]) -> None:
+    """Least time starts from words of arcs, and a spread has one sum of squares: what only the other searches read is refused."""
+    for asked, (idle, instead) in _IDLE.items():
+        stray = [name for name in idle if name in options]
+        if stray and (options.get("objective") == "time" if asked == "time" else asked in options):
+            raise SteeringInputError(f"{where}: {', '.join(stray)} has no effect {instead}")
 
 
 def direct_options() -> set[str]:

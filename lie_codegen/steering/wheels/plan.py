@@ -121,7 +121,7 @@ class WheelPlan(Saved):
         if not isinstance(self.plan, Plan):
             raise InputError("generate: a wheel plan with torques is kept as knots: plan.plan.t and plan.plan.torques")
         inner = self.plan.package_parts(own.namespace, real, form)
-        return PackageParts(own.namespace, (*own.kernels, *inner.kernels), inner.files)
+        return PackageParts(own.namespace, (*own.kernels, *inner.kernels), inner.files, has_forms=True)
 
     @cached_property
     def _table(self) -> PlanTable:
