@@ -1,4 +1,4 @@
-// Dragging the target solves again: the generated C in WebAssembly, the same text that is compiled for Python and for flight.
+// Moving the target solves again: the generated C in WebAssembly, the same text that is compiled for Python and for flight.
 (() => {
   const s = data.solver, d = s.basis[0].length, n = s.basis.length, bytes = Uint8Array.from(atob(s.wasm), c => c.charCodeAt(0));
   const hat = hatted(s.basis);
@@ -29,20 +29,34 @@
     data.series[1].name = "|X - target|";
     data.series[1].values = [data.t.map((_, k) => Math.hypot(...found.goal.flat().map((v, i) => found.X[size * k + i] - v)))];
     data.facts = [["cost", found.cost.toPrecision(12)], ["solver", found.status === 1 ? "an extremal that ends at the target, the cheapest found" : "no plan found for this target"], ["time of the solver", found.spent.toFixed(2) + " ms"]];
-    element("words").textContent = "Move the target: the generated C solves again in this page.";
     element("time").max = s.points - 1;
     place = Math.min(place, s.points - 1);
     facts();
   }
-  const knobs = element("knobs"), x = [...s.target];
-  x.forEach((value, i) => {
-    const label = document.createElement("label"), range = document.createElement("input"), now = document.createElement("output"), most = Math.max(3, Math.ceil(Math.abs(value)));
-    range.type = "range"; range.min = -most; range.max = most; range.step = .01; range.value = value; range.id = "target_" + i;
-    now.textContent = value.toFixed(2) + " " + s.units[i];
+  const x = [...s.target];
+  let goal;
+  const sliders = x.map((_, i) => {
+    const label = document.createElement("label"), range = document.createElement("input"), now = document.createElement("output");
+    range.type = "range"; range.max = 3; range.step = .01; range.id = "target_" + i;
     label.append("target " + s.labels[i] + " ", range, now);
-    range.addEventListener("input", () => { x[i] = +range.value; now.textContent = x[i].toFixed(2) + " " + s.units[i]; take(solve(x)); show(); });
-    knobs.append(label);
+    range.addEventListener("input", () => moveTo(x.map((value, k) => k === i ? +range.value : value)));
+    element("knobs").append(label);
+    return { range, now };
   });
-  take(solve(x));
-  window.lieSolver = { solve };
+  // the target's logarithm, from a slider or from elsewhere: every slider shows it, to its step; the solver has it to the last bit
+  function moveTo(values) {
+    values.forEach((value, i) => {
+      const { range, now } = sliders[i], most = Math.max(+range.max, Math.ceil(Math.abs(value)));
+      x[i] = value;
+      range.max = most; range.min = -most; range.value = value;
+      now.textContent = value.toFixed(2) + " " + s.units[i];
+    });
+    const found = solve(x);
+    goal = found.goal;
+    take(found);
+    show();
+  }
+  element("words").textContent = "Move the target: the generated C solves again in this page.";
+  window.lieSolver = { solve, moveTo, get x() { return [...x]; }, get goal() { return goal; } };
+  moveTo(x);
 })();

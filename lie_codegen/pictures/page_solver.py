@@ -79,6 +79,8 @@ def page_solver(plan: Any) -> dict[str, Any]:
         "basis": group.basis.tolist(),
         "labels": list(group.labels),
         "units": list(group.units),
+        # coordinates of a matrix of the algebra, by its entries in rows: a dragged target's logarithm
+        "vee": np.linalg.pinv(group.basis.reshape(group.dim, -1).T).tolist(),
         "target": np.asarray(x).tolist(),
         "plane": motion_of(group, np.asarray(plan.target)[None]).kind == "plane",
     }

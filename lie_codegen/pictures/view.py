@@ -52,8 +52,8 @@ def view(
         obstacles: cones and balls, drawn with the motion.
         title: heading of the page.
         samples: times shown of a Plan and of an average.
-        solve: of a plan without bounds on SO(3): the generated C, compiled to WebAssembly, goes into the page, and dragging the
-            target solves again there. Needs the extra `lie_codegen[zig]`.
+        solve: of a plan without bounds on rotations or poses: the generated C, compiled to WebAssembly, goes into the page, and moving the
+            target by its sliders, on SO(3) and SE(2) by dragging it in the view too, solves again there. Needs the extra `lie_codegen[zig]`.
 
     Raises:
         InputError: nothing that a page can show, an unknown body, a glTF file that cannot be read.
@@ -94,7 +94,7 @@ def page_text(
     elif solve:
         from lie_codegen.pictures.page_solver import page_solver
 
-        solver, script = page_solver(what), _part("page_solver.js")
+        solver, script = page_solver(what), _part("page_solver.js") + _part("page_target.js")
     shown = Scene(
         title or scene.title,
         scene.words,

@@ -39,7 +39,7 @@ def widget(
         obstacles: cones and balls, drawn with the motion.
         title: heading of the page.
         samples: times shown of a Plan and of an average.
-        solve: of a plan without bounds on SO(3): dragging the target solves again in the cell.
+        solve: of a plan without bounds on rotations or poses: moving the target, by drag or sliders, solves again in the cell.
         height: of the cell's output, pixels.
 
     Raises:

@@ -172,19 +172,130 @@ def test_the_page_of_an_average_integrates_as_python_does(tmp_path: Path, tab: A
     assert tab.locator("#eps_now").inner_text() == "0.40"
 
 
+@pytest.fixture(scope="module", params=["so3", "se2"])
+def solved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """A group and its page with the solver, which compiles for seconds: once for all the tests of it."""
+    if importlib.util.find_spec("ziglang") is None:
+        pytest.skip("no ziglang")
+    name = str(request.param)
+    plan = lc.steer(name, [0.5, -0.3, 0.9], lc.group(name).labels[:2], 8.0, "optimal")
+    return name, lc.view(plan, tmp_path_factory.mktemp("solved") / f"{name}.html", solve=True)
+
+
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="no ziglang")
-@pytest.mark.parametrize("name", ["so3", "se2"])
-def test_the_solver_in_the_page_gives_the_digits_of_python(tmp_path: Path, tab: Any, name: str) -> None:
+def test_the_solver_in_the_page_gives_the_digits_of_python(solved: tuple[str, Path], tab: Any) -> None:
+    name, page = solved
     group = lc.group(name)
-    controls = group.labels[:2]
-    plan = lc.steer(name, [0.5, -0.3, 0.9], controls, 8.0, "optimal")
-    tab.goto(lc.view(plan, tmp_path / "s.html", solve=True).as_uri())
+    tab.goto(page.as_uri())
     log = lc.build(name).log
     for target in ([0.5, -0.3, 0.9], [0.2, 0.4, -0.6], [-0.8, 0.1, 0.3]):
-        other = lc.steer(name, target, controls, 8.0, "optimal")
+        other = lc.steer(name, target, group.labels[:2], 8.0, "optimal")
         x = np.asarray(log(np.asarray(other.target))).tolist()
         found = tab.evaluate(f"(() => {{ const r = lieSolver.solve({x}); return [r.status, r.cost, r.X]; }})()")
         assert found[0] == 1
         assert found[1] == pytest.approx(other.cost, rel=1e-12)
         assert np.max(np.abs(np.reshape(found[2], (201, group.degree, group.degree))[-1] - other.target)) < 1e-10
+
+
+def ring_of(tab: Any, k: int) -> Any:
+    return np.array(tab.evaluate(f"lieSolver.ring({k})"))
+
+
+def goal_in_step(tab: Any, name: str) -> Any:
+    """The target that the page shows, of which the cost, the sliders and their texts are held to be."""
+    goal = np.array(tab.evaluate("lieSolver.goal"))
+    x = np.asarray(lc.build(name).log(goal))
+    assert np.max(np.abs(np.array(tab.evaluate("lieSolver.x")) - x)) < 1e-12
+    for i, value in enumerate(x):
+        assert float(tab.locator(f"#target_{i}").input_value()) == pytest.approx(value, abs=0.00501)
+        assert float(tab.locator("#knobs output").nth(i).inner_text().split()[0]) == pytest.approx(value, abs=0.00501)
+    plan = lc.steer(name, goal, lc.group(name).labels[:2], 8.0, "optimal")
+    cost = float(tab.locator("#facts td").first.inner_text())
+    assert cost == pytest.approx(plan.cost, rel=1e-11)  # twelve digits are shown
+    return goal
+
+
+@pytest.mark.slow
+def test_the_target_is_dragged_by_mouse_and_finger(solved: tuple[str, Path], tab: Any) -> None:
+    name, page = solved
+    tab.goto(page.as_uri())
+    assert "drag the ring" in tab.locator("#legend").inner_text()
+    eye = tab.evaluate("[yaw, pitch]")
+    before = goal_in_step(tab, name)
+
+    def mouse(start: Any, way: tuple[float, float]) -> None:
+        tab.mouse.move(*start)
+        tab.mouse.down()
+        tab.mouse.move(*(start + np.array(way)), steps=5)
+        tab.mouse.up()
+
+    # by the tip of its first axis: the tip follows the mouse (which has pixels in single precision), in the plane its direction does
+    start = ring_of(tab, 0)
+    mouse(start, (-14.0, 11.0))
+    tip, goes = ring_of(tab, 0), start + np.array([-14, 11])
+    if name == "so3":
+        assert np.max(np.abs(tip - goes)) < 1e-3
+    else:
+        (a, b), (c, d) = tip - ring_of(tab, -1), goes - ring_of(tab, -1)
+        assert a * c + b * d > 0
+        assert abs(a * d - b * c) < 0.05
+    turned = goal_in_step(tab, name)
+    assert np.max(np.abs(turned - before)) > 0.05
+    if name == "se2":
+        assert np.allclose(turned[:2, 2], before[:2, 2], atol=1e-12)
+        start = ring_of(tab, -1)
+        mouse(start, (30.0, -20.0))
+        assert np.max(np.abs(ring_of(tab, -1) - start - (30, -20))) < 1e-3
+        moved = goal_in_step(tab, name)
+        assert np.allclose(moved[:2, :2], turned[:2, :2], atol=1e-12)
+        assert np.all((moved - turned)[:2, 2] > 0.05)
+    assert tab.evaluate("[yaw, pitch]") == eye
+
+    # elsewhere the same hand turns the view, and the target stays
+    goal = tab.evaluate("lieSolver.goal")
+    box = tab.locator("#space").bounding_box()
+    mouse(np.array([box["x"] + 12, box["y"] + 12]), (40.0, 10.0))
+    assert tab.evaluate("lieSolver.goal") == goal
+    assert tab.evaluate("yaw") == pytest.approx(eye[0] - 0.32)
+
+    # by a finger, which is broader
+    touch = tab.context.new_cdp_session(tab)
+    x, y = ring_of(tab, 1) + np.array([9, -8])
+    for kind, points in (
+        ("touchStart", [{"x": x, "y": y}]),
+        ("touchMove", [{"x": x + 12, "y": y + 9}]),
+        ("touchEnd", []),
+    ):
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    tab.wait_for_function(f"JSON.stringify(lieSolver.goal) !== '{json.dumps(goal, separators=(',', ':'))}'")
+    goal_in_step(tab, name)
+
+    # by a slider, and the rings go with it
+    tip = ring_of(tab, 0)
+    tab.locator("#target_2").fill("-0.5")
+    assert tab.evaluate("lieSolver.x")[2] == -0.5
+    assert np.max(np.abs(ring_of(tab, 0) - tip)) > 1
+    goal_in_step(tab, name)
+
+
+@pytest.mark.slow
+def test_a_dragged_target_far_round_and_past_the_rim(solved: tuple[str, Path], tab: Any) -> None:
+    """Long random drags from ring to ring: logarithms at every angle, beyond the first range of the sliders too."""
+    name, page = solved
+    tab.goto(page.as_uri())
+    box = tab.locator("#space").bounding_box()
+    random = np.random.default_rng(23)
+    largest, corner = 0.0, np.array([box["x"], box["y"]])
+    for _ in range(12):
+        tab.mouse.move(*ring_of(tab, int(random.integers(0, 2))))
+        tab.mouse.down()
+        tab.mouse.move(*(corner + random.uniform(0, 1, 2) * (box["width"], box["height"])), steps=3)
+        tab.mouse.up()
+        goal, x = np.array(tab.evaluate("lieSolver.goal")), np.array(tab.evaluate("lieSolver.x"))
+        R = goal if name == "so3" else goal[:2, :2]
+        assert np.max(np.abs(R.T @ R - np.eye(len(R)))) < 1e-12
+        assert np.max(np.abs(x - lc.build(name).log(goal))) < 1e-9
+        largest = max(largest, float(np.max(np.abs(x))))
+        for i in range(3):
+            assert float(tab.locator(f"#target_{i}").input_value()) == pytest.approx(x[i], abs=0.00501)
+    assert largest > 1.5
