@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.arrays import Array
 from lie_codegen.codegen.wasm import wasm_binary
 from lie_codegen.errors import InputError, MissingDependencyError
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.build import generate
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.scene import motion_of
 from lie_codegen.steering.plan import Plan
 
@@ -48,10 +50,10 @@ def page_solver(plan: Any) -> dict[str, Any]:
         MissingDependencyError: no ziglang.
         CodegenError: as `lc.generate`. CompileError: the compiler's own words.
     """
-    if not isinstance(plan, Plan) or plan.method != "optimal" or plan.group.is_complex:
-        raise InputError('view: solve=True takes a plan of method="optimal" on a real group')
-    group = plan.group
-    if motion_of(group, np.asarray(plan.target)[None]).kind == "point" or group.degree**2 > _MOST_SIZE:
+    if not isinstance(plan, Plan) or plan.method != "optimal":
+        raise InputError('view: solve=True takes a plan of method="optimal"')
+    group, kind = plan.group, motion_of(plan.group, np.asarray(plan.target)[None]).kind
+    if kind == "point" or group.degree**2 > _MOST_SIZE or (group.is_complex and not _is_su2(group)):
         raise InputError(f"view: the page moves rotations and poses; {group.name} has others")
     if importlib.util.find_spec("ziglang") is None:
         raise MissingDependencyError(
@@ -63,9 +65,11 @@ def page_solver(plan: Any) -> dict[str, Any]:
             path.relative_to(package).as_posix(): path.read_text(encoding="utf-8") for path in package.rglob("*.[ch]")
         }
     header = next(Path(path) for path in tree if path.startswith("include/"))
-    shape = {"prefix": header.stem, "size": group.degree**2, "controls": len(plan.controls), "points": _POINTS}
+    basis = _real(group.basis)
+    size = group.degree**2 * (2 if group.is_complex else 1)
+    shape = {"prefix": header.stem, "size": size, "controls": len(plan.controls), "points": _POINTS}
     binary = wasm_binary(tree, _WRAPPER.format(**shape), _EXPORTS)
-    x = logarithms(group).log(np.asarray(plan.target, dtype=float))
+    x = logarithms(group).log(np.asarray(plan.target))
     weights = plan.details.get("weights")
     return {
         "kind": "steer",
@@ -76,11 +80,26 @@ def page_solver(plan: Any) -> dict[str, Any]:
         "weights": np.ones(len(plan.controls)).tolist()
         if weights is None
         else np.asarray(weights, dtype=float).tolist(),
-        "basis": group.basis.tolist(),
+        "complex": group.is_complex,
+        "basis": basis.tolist(),
         "labels": list(group.labels),
         "units": list(group.units),
         # coordinates of a matrix of the algebra, by its entries in rows: a dragged target's logarithm
-        "vee": np.linalg.pinv(group.basis.reshape(group.dim, -1).T).tolist(),
+        "vee": np.linalg.pinv(basis.reshape(group.dim, -1).T).tolist(),
         "target": np.asarray(x).tolist(),
-        "plane": motion_of(group, np.asarray(plan.target)[None]).kind == "plane",
+        "plane": kind == "plane",
     }
+
+
+def _is_su2(group: MatrixGroup) -> bool:
+    """All of su(2) in its least matrices, whatever the basis: three skew-Hermitian matrices of two rows without trace."""
+    A = group.basis
+    skew = np.allclose(A, -np.conj(np.swapaxes(A, 1, 2)))
+    return group.dim == 3 and group.degree == 2 and skew and np.allclose(np.trace(A, axis1=1, axis2=2), 0)
+
+
+def _real(A: Array) -> Array:
+    """Complex matrices as real ones of twice the rows, an entry a + ib as [[a, -b], [b, a]]; real ones as they are."""
+    if not np.iscomplexobj(A):
+        return A
+    return np.kron(A.real, np.eye(2)) + np.kron(A.imag, np.array([[0.0, -1.0], [1.0, 0.0]]))

@@ -53,7 +53,7 @@ def view(
         title: heading of the page.
         samples: times shown of a Plan and of an average.
         solve: of a plan without bounds on rotations or poses: the generated C, compiled to WebAssembly, goes into the page, and moving the
-            target by its sliders, on SO(3) and SE(2) by dragging it in the view too, solves again there. Needs the extra `lie_codegen[zig]`.
+            target by its sliders, on SO(3), SU(2) and SE(2) by dragging it in the view too, solves again there. Needs the extra `lie_codegen[zig]`.
 
     Raises:
         InputError: nothing that a page can show, an unknown body, a glTF file that cannot be read.

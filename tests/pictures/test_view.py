@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import lie_codegen as lc
+from lie_codegen.pictures.scene import motion_of
 
 
 def data_of(page: Path) -> Any:
@@ -172,7 +173,7 @@ def test_the_page_of_an_average_integrates_as_python_does(tmp_path: Path, tab: A
     assert tab.locator("#eps_now").inner_text() == "0.40"
 
 
-@pytest.fixture(scope="module", params=["so3", "se2"])
+@pytest.fixture(scope="module", params=["so3", "se2", "su2"])
 def solved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """A group and its page with the solver, which compiles for seconds: once for all the tests of it."""
     if importlib.util.find_spec("ziglang") is None:
@@ -194,16 +195,26 @@ def test_the_solver_in_the_page_gives_the_digits_of_python(solved: tuple[str, Pa
         found = tab.evaluate(f"(() => {{ const r = lieSolver.solve({x}); return [r.status, r.cost, r.X]; }})()")
         assert found[0] == 1
         assert found[1] == pytest.approx(other.cost, rel=1e-12)
-        assert np.max(np.abs(np.reshape(found[2], (201, group.degree, group.degree))[-1] - other.target)) < 1e-10
+        last = np.array(found[2]).view(group.basis.dtype).reshape(201, group.degree, group.degree)[-1]
+        assert np.max(np.abs(last - other.target)) < 1e-10
+    tab.evaluate(f"lieSolver.moveTo({x})")
+    R = np.reshape(tab.evaluate("lieView.pose(200).R"), (3, 3))
+    assert np.max(np.abs(R - motion_of(group, other.target[None]).R[0])) < 1e-10
 
 
 def ring_of(tab: Any, k: int) -> Any:
     return np.array(tab.evaluate(f"lieSolver.ring({k})"))
 
 
+def goal_of(tab: Any, name: str) -> Any:
+    """The target as Python has it; the page has complex entries a + ib as [[a, -b], [b, a]]."""
+    shown = np.array(tab.evaluate("lieSolver.goal"))
+    return shown[::2, ::2] + 1j * shown[1::2, ::2] if lc.group(name).is_complex else shown
+
+
 def goal_in_step(tab: Any, name: str) -> Any:
     """The target that the page shows, of which the cost, the sliders and their texts are held to be."""
-    goal = np.array(tab.evaluate("lieSolver.goal"))
+    goal = goal_of(tab, name)
     x = np.asarray(lc.build(name).log(goal))
     assert np.max(np.abs(np.array(tab.evaluate("lieSolver.x")) - x)) < 1e-12
     for i, value in enumerate(x):
@@ -233,7 +244,7 @@ def test_the_target_is_dragged_by_mouse_and_finger(solved: tuple[str, Path], tab
     start = ring_of(tab, 0)
     mouse(start, (-14.0, 11.0))
     tip, goes = ring_of(tab, 0), start + np.array([-14, 11])
-    if name == "so3":
+    if name != "se2":
         assert np.max(np.abs(tip - goes)) < 1e-3
     else:
         (a, b), (c, d) = tip - ring_of(tab, -1), goes - ring_of(tab, -1)
@@ -291,9 +302,9 @@ def test_a_dragged_target_far_round_and_past_the_rim(solved: tuple[str, Path], t
         tab.mouse.down()
         tab.mouse.move(*(corner + random.uniform(0, 1, 2) * (box["width"], box["height"])), steps=3)
         tab.mouse.up()
-        goal, x = np.array(tab.evaluate("lieSolver.goal")), np.array(tab.evaluate("lieSolver.x"))
-        R = goal if name == "so3" else goal[:2, :2]
-        assert np.max(np.abs(R.T @ R - np.eye(len(R)))) < 1e-12
+        goal, x = goal_of(tab, name), np.array(tab.evaluate("lieSolver.x"))
+        R = goal[:2, :2] if name == "se2" else goal
+        assert np.max(np.abs(np.conj(R.T) @ R - np.eye(len(R)))) < 1e-12
         assert np.max(np.abs(x - lc.build(name).log(goal))) < 1e-9
         largest = max(largest, float(np.max(np.abs(x))))
         for i in range(3):
