@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from lie_codegen.errors import InputError
 from lie_codegen.groups.group_library import GroupLibrary, group_library
 from lie_codegen.identifiers import check_identifier
+from lie_codegen.kernel.plain_data import makes_records
 from lie_codegen.runtime.build import build_kernels, defined_together
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.runtime.current_package import current_package, package_key, remember_package
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 #: What `generate(steering=)` adds is written by a floor above this one, named here and loaded when asked for.
 STEERING_PACKAGE = ("lie_codegen.steering.shooting.package", "render_steering_package")
+#: Bytes as a text and back, whatever they are: a definition holds texts.
+_BYTES = {"encoding": "utf-8", "errors": "surrogateescape"}
 
 
 @overload
@@ -70,10 +73,10 @@ def build(what: Buildable, *, kernels: Sequence[str] | Literal["all"] = (), name
                 lambda: given, namespace=_package_name(given, name), definition=defined_together(given)
             )
             require_kernels(whole, () if kernels == "all" else kernels)
-            whole.made_by(_build_kernels, given, name)
+            whole.made_by(built_kernels, given, name)
             whole.compiled_from(lambda asked: next(each for each in given if asked in (each.name, each.symbol)))
             return whole
-        library = _build_group(group, name)
+        library = built_group(group, name)
     library.compile(library.kernels if kernels == "all" else kernels)
     return library
 
@@ -256,32 +259,38 @@ def object_definition(group: MatrixGroup) -> str:
     return f"group\n{group.definition_text}"
 
 
-def _build_group(group: MatrixGroup, name: str | None) -> GroupLibrary:
+@makes_records
+def built_group(group: MatrixGroup, name: str | None) -> GroupLibrary:
+    """The library of a group, as pickles and files name it."""
     library = group_library(object_definition(group), lambda: group, name)
-    library.made_by(_build_group, group, name)
+    library.made_by(built_group, group, name)
     return library
 
 
 def _build_named(what: str | Path, name: str | None) -> GroupLibrary:
     from lie_codegen.groups.catalogue_names import definition_source
 
-    return _build_source(str(what), definition_source(what), name)
+    return built_source(str(what), definition_source(what).decode(**_BYTES), name)
 
 
-def _build_source(what: str, source: bytes, name: str | None = None) -> GroupLibrary:
+@makes_records
+def built_source(what: str, source: str, name: str | None) -> GroupLibrary:
     """The group of the text of a catalogue entry or a file: a file itself need not be where the library is made again."""
+    data = source.encode(**_BYTES)
 
     def load() -> MatrixGroup:
         from lie_codegen.groups.catalogue_load import group_of_source
 
-        return group_of_source(what, source)
+        return group_of_source(what, data)
 
-    library = group_library(source_definition(source), load, name)
-    library.made_by(_build_source, str(what), source, name)
+    library = group_library(source_definition(data), load, name)
+    library.made_by(built_source, what, source, name)
     return library
 
 
-def _build_kernels(kernels: tuple[Kernel, ...], name: str | None) -> Library:
+@makes_records
+def built_kernels(kernels: tuple[Kernel, ...], name: str | None) -> Library:
+    """The library of kernels, as pickles and files name it."""
     return build(kernels, name=name)
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import prod
+from pathlib import Path
 from typing import Any
 
 from lie_codegen.errors import InputError, ShapeError
@@ -139,6 +140,17 @@ class Kernel:
                 )
         record = (self.name, self.namespace, self.inputs, self.outputs, self.body, self.formula, self.source)
         return Kernel, (*record, self.sampler)
+
+    def save(self, path: str | Path) -> Path:
+        """Write its definition as an npz file from which `lc.load` makes it again; returns the path.
+
+        Raises:
+            InputError: it was written by hand or by a factory of the user's; those pickle.
+            OSError: the file cannot be written.
+        """
+        from lie_codegen.kernel.saved import save_definition  # what reads and writes files is imported by whoever saves
+
+        return save_definition(self, path, f"the kernel {self.symbol}")
 
     @property
     def symbol(self) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.kernel.records import complete, decoded, encoded
+from lie_codegen.kernel.records import check_kinds, complete, decoded, encoded
 from lie_codegen.values import Value
 
 FORMAT, VERSION = "lie_codegen value", 1
@@ -35,18 +35,40 @@ class Saved(Value):
             InputError: it holds something that is no data, as a function written by the user; names it.
             OSError: the file cannot be written.
         """
-        arrays: dict[str, Array] = {}
-        record = encoded(self, arrays, type(self).__name__)
-        header = json.dumps({"format": FORMAT, "version": VERSION, "value": record}, sort_keys=True)
-        buffer = io.BytesIO()
-        np.savez_compressed(buffer, header=np.frombuffer(header.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
-        target = Path(path)
-        target.write_bytes(buffer.getvalue())
-        return target
+        return _write(self, path)
+
+
+def save_definition(thing: Any, path: str | Path, what: str) -> Path:
+    """Write a kernel, a library or a compiled function as its definition; returns the path.
+
+    Raises:
+        InputError: it has no definition, or one that names a factory of the user's, which `load` would not call.
+        OSError: the file cannot be written.
+    """
+    if thing.definition is None:
+        raise InputError(
+            f"{what} cannot be saved: a function written by hand is no data; make it by a factory of this package, or pickle it"
+        )
+    try:
+        check_kinds(thing.definition, what)
+    except InputError as problem:
+        raise InputError(f"{problem} and cannot be saved; pickle it") from None
+    return _write(thing, path)
+
+
+def _write(value: Any, path: str | Path) -> Path:
+    arrays: dict[str, Array] = {}
+    record = encoded(value, arrays, type(value).__name__)
+    header = json.dumps({"format": FORMAT, "version": VERSION, "value": record}, sort_keys=True)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, header=np.frombuffer(header.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
+    target = Path(path)
+    target.write_bytes(buffer.getvalue())
+    return target
 
 
 def load(path: str | Path) -> Any:
-    """The value of a file that `save` wrote.
+    """The value of a file that `save` wrote; a library is built again, or found in the cache.
 
     Raises:
         InputError: no such file, not one of ours, of a later version, or it names something that is no value of this package.

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from contextlib import nullcontext
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, is_step, python_field
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.kernel.plain_data import Definition, makes_records
 from lie_codegen.runtime.arguments import bind, checked, describe, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend
@@ -336,7 +338,27 @@ class Compiled(Generic[Result]):
         """How it is made again, for pickle."""
         if self._library is None:
             raise TypeError(f"the kernel {self.name} belongs to no library made by lc.build and cannot be pickled")
-        return _kernel_of, (self._library, self.name)
+        return kernel_of_library, (self._library, self.name)
+
+    @property
+    def definition(self) -> Definition | None:
+        """What makes it again, as plain data; None where its library has none."""
+        whole = None if self._library is None else self._library.definition
+        if whole is None:
+            return None
+        kind = f"{__name__}:{kernel_of_library.__name__}"
+        return Definition({"kind": kind, "parameters": Definition({"library": whole, "name": self.name})})
+
+    def save(self, path: str | Path) -> Path:
+        """Write what makes it again as an npz file: `lc.load` builds its library, or finds it in the cache; returns the path.
+
+        Raises:
+            InputError: its library has no definition.
+            OSError: the file cannot be written.
+        """
+        from lie_codegen.kernel.saved import save_definition
+
+        return save_definition(self, path, f"the compiled kernel {self.name}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return self.reduced()
@@ -360,7 +382,9 @@ def _doubles(array: Array) -> int:
     return 2 if array.dtype.kind == "c" else 1
 
 
-def _kernel_of(library: Any, name: str) -> Any:
+@makes_records
+def kernel_of_library(library: Any, name: str) -> Any:
+    """A compiled kernel as pickles and files name it."""
     return library[name]
 
 

@@ -9,6 +9,7 @@ from weakref import WeakValueDictionary
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.errors import CodegenError, InputError
+from lie_codegen.kernel.plain_data import Definition, NoDefinitionError
 
 if TYPE_CHECKING:
     from lie_codegen.kernel.kernel import Kernel
@@ -72,6 +73,33 @@ class Library:
                 f"the library {self.namespace} was not made by lc.build and knows no kernels; give the Kernel"
             )
         return self._kernel(name)
+
+    @property
+    def definition(self) -> Definition | None:
+        """What makes it again, as plain data; None where it was not made by lc.build, or of kernels written by hand."""
+        if not self._recipe:
+            return None
+        import inspect
+
+        from lie_codegen.kernel.definition import definition_of
+
+        make, *arguments = self._recipe
+        try:
+            named = dict(zip(inspect.signature(make).parameters, arguments, strict=True))
+            return definition_of(f"{make.__module__}:{make.__qualname__}", named)
+        except NoDefinitionError:
+            return None
+
+    def save(self, path: str | Path) -> Path:
+        """Write what makes it again as an npz file: `lc.load` builds it, or finds it in the cache; returns the path.
+
+        Raises:
+            InputError: it has no definition.
+            OSError: the file cannot be written.
+        """
+        from lie_codegen.kernel.saved import save_definition
+
+        return save_definition(self, path, f"the library {self.namespace}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         if not self._recipe:

@@ -7,6 +7,7 @@ import json
 import pickle
 import random
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -135,7 +136,7 @@ def several(made: Any) -> tuple[lc.Kernel, ...]:
 
 @pytest.mark.filterwarnings("ignore::lie_codegen.errors.InertiaWarning", "ignore::lie_codegen.errors.AssumptionWarning")
 @pytest.mark.parametrize("name", MADE)
-def test_a_kernel_is_what_its_definition_says(name: str) -> None:
+def test_a_kernel_is_what_its_definition_says(name: str, tmp_path: Path) -> None:
     make, (one, other) = MADE[name]
     kernels = several(make(one))
     for kernel, twin, changed in zip(kernels, several(make(one)), several(make(other)), strict=True):
@@ -145,6 +146,7 @@ def test_a_kernel_is_what_its_definition_says(name: str) -> None:
         assert kernel != changed
         again = made_from(json.loads(kernel.definition.text))
         assert again == pickle.loads(pickle.dumps(kernel)) == kernel
+        assert lc.load(kernel.save(tmp_path / "kernel.npz")) == kernel
     # ... and it computes the same: the first of them that can be evaluated by itself
     first, again = kernels[0], several(made_from(json.loads(kernels[0].definition.text)))[0]  # type: ignore[union-attr]
     point = first.sample(random.Random(1))
