@@ -31,10 +31,8 @@ class Grid:
     def coarse(times: Array, breakpoints: Array) -> Grid:
         """One step a span, and at least 32 in all."""
         inside = breakpoints[(breakpoints > times[0]) & (breakpoints < times[-1])]
+        # A breakpoint beside an output time stays a knot, however short the span between: without it the jump would lie within a step.
         knots = np.unique(np.concatenate([times, inside]))
-        smallest = 1e-13 * (times[-1] - times[0])
-        keep = np.concatenate([[True], np.diff(knots) > smallest]) | np.isin(knots, times)
-        knots = knots[keep]
         parts = max(1, -(-32 // (len(knots) - 1)))
         return Grid(knots, parts, np.searchsorted(knots, times))
 

@@ -51,7 +51,8 @@ class PlanView:
     places: tuple[int, ...]
     edges: tuple[tuple[str, ...], ...]
     coefficients: tuple[tuple[tuple[str, ...], ...], ...]
-    drift: bool
+    equation: str
+    flown: bool
     drift_row: tuple[str, ...]
     start: tuple[str, ...]
     samples: tuple[tuple[str, ...], ...]
@@ -65,6 +66,9 @@ def plan_parts(plan: Plan, name: str | None, real: str, form: str = "auto") -> P
     Raises:
         CodegenError: no such real type.
         InputError, ComputationError: as `plan_table`; the replay does not meet the plan's own path.
+
+    The replay flies X' = X hat(u + drift) with a constant drift. Of plans of other systems (torques, a drift that depends on time, a velocity
+    that acts from the left of X) it compares the controls alone; the header says what the system is.
     """
     if real not in REALS:
         raise CodegenError(f"real is one of {', '.join(REALS)}, given {real!r}")
@@ -90,7 +94,8 @@ def _view(plan: Plan, table: PlanTable, package: str, real: str) -> PlanView:
     velocity = np.zeros(group.dim) if drift is None else np.asarray(drift, dtype=float)
     times = plan.duration * np.linspace(0.01, 0.99, _SAMPLES)
     start = plan.X(0.0)
-    flights, marks = _flights(plan, table, velocity, _FLOWN[real])
+    equation, flown = _system(plan)
+    flights, marks = _flights(plan, table, velocity, _FLOWN[real]) if flown else ([], [])
     edges = row(table.edges)
     units = [f"u[{i}]: {label}" + (f" [{unit}/s]" if unit else "") for i, (label, unit) in _numbered(plan)]
     shape = "a Fourier series" if table.is_fourier else f"polynomials of degree {table.coefficients.shape[2] - 1}"
@@ -117,7 +122,8 @@ def _view(plan: Plan, table: PlanTable, package: str, real: str) -> PlanView:
         places=table.places,
         edges=tuple(edges[i : i + 8] for i in range(0, len(edges), 8)),
         coefficients=tuple(tuple(row(each) for each in piece) for piece in table.coefficients),
-        drift=drift is not None,
+        equation=equation,
+        flown=flown,
         drift_row=row(velocity),
         start=row(_flat(start)),
         samples=tuple(row([t, *values]) for t, values in zip(times, plan.u(times), strict=True)),
@@ -126,6 +132,20 @@ def _view(plan: Plan, table: PlanTable, package: str, real: str) -> PlanView:
         ),
         marks=tuple(row(_flat(X)) for X in marks),
     )
+
+
+def _system(plan: Plan) -> tuple[str, bool]:
+    """The equation that u is the input of, and whether a replay by steps of X' = X hat(u + drift) follows it."""
+    details = plan.details
+    if details.get("inertia") is not None:
+        return "I xi' = ad*_xi I xi + u(t), X' = X hat(xi)", False
+    system = details.get("system")
+    drift = details.get("drift") if system is None else system.drift.constant
+    steady = system is None or drift is not None
+    velocity = "u(t) + drift(t)" if not steady else "u(t) + drift" if drift is not None and np.any(drift) else "u(t)"
+    if system is not None and system.right:
+        return f"X' = hat({velocity}) X", False
+    return f"X' = X hat({velocity})", steady
 
 
 def _numbered(plan: Plan) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -250,3 +252,22 @@ def test_texts_of_any_rates_are_evaluated_by_the_loop() -> None:
     np.testing.assert_allclose(run.X, read.X, rtol=0, atol=1e-11)
     same = lc.simulate("so3", lc.ParametricInput(texts, ()), t=[0, 1, 5])
     np.testing.assert_array_equal(run.X, same.X)
+
+
+@pytest.mark.parametrize("off", [-1e-13, -1e-15, 0, 3e-16, 5e-14])
+def test_output_times_beside_a_jump(off: float) -> None:
+    """A jump that lies a few roundings from an output time still lies between two steps: three turns with constant velocities."""
+
+    class Jumps:
+        breakpoints = np.array([0.3, 1.1])
+
+        def __call__(self, t: Any) -> Any:
+            s = np.asarray(t)[..., None]
+            return np.where(s < 0.3, [1.0, 0, 0], np.where(s < 1.1, [0, 2.0, 0], [0, 0, -1.5]))
+
+    t = np.array([0, 0.3 + off, 1.1 - off, 2])
+    hat = lc.group("so3").hat
+    wanted = expm(hat([0.3, 0, 0])) @ expm(hat([0, 1.6, 0])) @ expm(hat([0, 0, -1.35]))
+    for method in ("auto", "rkmk4"):
+        run = lc.simulate("so3", Jumps(), t=t, method=method, tolerance=1e-9)
+        np.testing.assert_allclose(run.X[-1], wanted, atol=1e-12)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import shutil
 import subprocess
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import InputError
@@ -172,3 +176,59 @@ def test_law_files(tmp_path: Path) -> None:
             lc.read_law(file)
     with pytest.raises(InputError, match="cannot be read"):
         lc.read_law(tmp_path / "none.toml")
+
+
+def other_systems() -> dict[str, tuple[lc.Plan, Callable[[float, np.ndarray, np.ndarray], np.ndarray]]]:
+    """Plans of systems that are not X' = X hat(u + drift), each with its own right-hand side."""
+    so3, su2 = lc.group("so3"), lc.group("su2")
+    R = expm(so3.hat([0.4, 0.3, -0.8]))
+    U = expm(np.einsum("a,aij->ij", [0.4, 0.3, -0.8], su2.basis))
+    J = np.diag([1.0, 2, 3])
+
+    def moving(t: float, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return (y.reshape(3, 3) @ so3.hat(u + 0.3 * np.cos(t) * np.eye(3)[2])).ravel()
+
+    def right(_: float, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        A = np.einsum("a,aij->ij", u + 0.3 * np.eye(3)[2], su2.basis)
+        return (A @ y.view(complex).reshape(2, 2)).ravel().view(float)
+
+    def torques(_: float, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        w = y[9:]
+        turning = np.linalg.solve(J, np.cross(J @ w, w) + u)
+        return np.append((y[:9].reshape(3, 3) @ so3.hat(w)).ravel(), turning)
+
+    options = {"bounds": 2, "method": "direct"}
+    return {
+        "moving": (lc.steer(so3, R, ["w1", "w2"], 3.0, drift={"w3": "0.3*cos(t)"}, **options), moving),
+        "right": (lc.steer(su2, U, ["sx", "sy"], 3.0, drift=[0, 0, 0.3], equation="right", **options), right),
+        "torques": (
+            lc.steer(so3, R, ["w1", "w2", "w3"], 3.0, dynamics="second_order", inertia=[1, 2, 3], bounds=5),
+            torques,
+        ),
+    }
+
+
+def test_plans_of_other_systems_become_their_controls(tmp_path: Path) -> None:
+    """The header says what the system is, and SciPy on that system with what C returns ends at the target."""
+    said = {"moving": "u(t) + drift(t)", "right": "X' = hat(u(t) + drift) X", "torques": "ad*_xi I xi + u(t)"}
+    for kind, (plan, slope) in other_systems().items():
+        name = plan.group.name
+        folder = lc.generate(plan, tmp_path / kind)
+        header = (folder / f"include/{name}_plan.h").read_text()
+        assert said[kind] in header
+        assert "compares u with test vectors" in header
+        done = replay(folder, name)
+        assert done.returncode == 0, done.stdout
+        assert "path" not in done.stdout
+        size = plan.group.degree**2 * (2 if plan.group.is_complex else 1)
+        y = np.zeros(size + (3 if kind == "torques" else 0))
+        y[:size] = np.eye(plan.group.degree, dtype=complex if plan.group.is_complex else float).ravel().view(float)
+        marks = np.unique([0, *plan.u.breakpoints, plan.duration])
+        for a, b in itertools.pairwise(marks):
+            inner = np.linspace(a, b, 13)[1:-1]
+            grid = np.concatenate([[a + 1e-9], inner, [b - 1e-9]])
+            values, _ = controls_in_c(folder, name, 3, grid)
+            u = CubicSpline(grid, values)
+            y = solve_ivp(lambda t, y, u=u, slope=slope: slope(t, y, u(t)), (a, b), y, rtol=1e-7, atol=1e-8).y[:, -1]
+        X = y[:size].view(complex if plan.group.is_complex else float).reshape(plan.target.shape)
+        np.testing.assert_allclose(X, plan.target, rtol=0, atol=1e-5)
