@@ -224,11 +224,11 @@ def test_plans_of_other_systems_become_their_controls(tmp_path: Path) -> None:
         y = np.zeros(size + (3 if kind == "torques" else 0))
         y[:size] = np.eye(plan.group.degree, dtype=complex if plan.group.is_complex else float).ravel().view(float)
         marks = np.unique([0, *plan.u.breakpoints, plan.duration])
-        for a, b in itertools.pairwise(marks):
-            inner = np.linspace(a, b, 13)[1:-1]
-            grid = np.concatenate([[a + 1e-9], inner, [b - 1e-9]])
-            values, _ = controls_in_c(folder, name, 3, grid)
-            u = CubicSpline(grid, values)
-            y = solve_ivp(lambda t, y, u=u, slope=slope: slope(t, y, u(t)), (a, b), y, rtol=1e-7, atol=1e-8).y[:, -1]
+        grids = [np.linspace(a + 1e-9, b - 1e-9, 13) for a, b in itertools.pairwise(marks)]
+        values, _ = controls_in_c(folder, name, 3, np.concatenate(grids))
+        for grid, part in zip(grids, np.split(values, len(grids)), strict=True):
+            ends = (grid[0] - 1e-9, grid[-1] + 1e-9)
+            u = CubicSpline(grid, part)
+            y = solve_ivp(lambda t, y, u=u, slope=slope: slope(t, y, u(t)), ends, y, rtol=1e-7, atol=1e-8).y[:, -1]
         X = y[:size].view(complex if plan.group.is_complex else float).reshape(plan.target.shape)
         np.testing.assert_allclose(X, plan.target, rtol=0, atol=1e-5)
