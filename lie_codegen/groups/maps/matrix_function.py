@@ -151,6 +151,8 @@ class LinearFamily:
 
     def second(self, j: int) -> dict[int, tuple[int, Scalar]]:
         """A^2 e_j, from its exact quadratic polynomials."""
+        # Summed exactly before any arithmetic: A^2 of a Lie algebra loses most of its terms (of so(3) w w^T - |w|^2 remains), and a term that
+        # cancels here is neither computed nor rounded. An entry whose polynomial is zero is zero for every x and is left out.
         squares: dict[int, dict[tuple[int, ...], Any]] = {}
         for c, entry in self.columns[j].items():
             for r, other in self.columns[c].items():
@@ -171,6 +173,7 @@ class LinearFamily:
 
     def _polynomial(self, polynomial: Mapping[tuple[int, ...], Any]) -> tuple[int, Scalar]:
         """A homogeneous polynomial, up to a sign that makes its first coefficient positive."""
+        # With the first coefficient positive p and -p have one key, so that the two entries +-w_3 of a rotation cost one value.
         items = sorted(polynomial.items())
         sign = -1 if items[0][1].is_negative else 1
         key = tuple((m, sign * value) for m, value in items)
@@ -218,6 +221,8 @@ class FunctionOfMatrix:
                 for r, entry in self.column(j).items():
                     total[r] = add(total.get(r, 0), product(entry, value))
             return total
+        # The columns share one q, so one polynomial mu^k (mu + q)^m, as long as the longest, annihilates all of them: Newton's sum for it is right
+        # for each, and by linearity for v. With different q it would be right for none but its own column.
         zeros = max((pattern.zeros for pattern in columns), default=1)
         pairs = max((pattern.pairs for pattern in columns), default=0)
         # A column without pairs is annihilated by its zeros alone, and so by any longer polynomial.
@@ -242,6 +247,7 @@ class FunctionOfMatrix:
 
     def _at(self, form: QuadraticForm, pattern: ColumnPattern) -> tuple[Scalar, Values]:
         if form not in self._values:
+            # All tails that any column with this q will ask for, at once: they share one sine, one cosine, one square root of q.
             z = self.family.form(form) if not self._vanishes(form) else 0
             tails = sorted(set(_tails(pattern)) | {t for p in self.patterns if p.form == form for t in _tails(p)})
             signed = not form.is_nonnegative
@@ -253,6 +259,9 @@ class FunctionOfMatrix:
 
     def _terms(self, pattern: ColumnPattern) -> list[tuple[tuple[int, int], Scalar]]:
         """((power, s), coefficient): f(A) e_j = sum of coefficient A^power (A^2 + q)^s e_j."""
+        # A^(2 i + odd) for the node 0, counted in mu = lambda^2: of k zeros in lambda the even part has ceil(k/2), the odd one, which has a lambda in
+        # front, floor(k/2). Behind them the node -q: the divided difference over 0 (a times) and -q (s + 1 times) is the s-th derivative
+        # of the tail of the series after a terms, over s!, which is entire in q: nothing is divided by q.
         terms: list[tuple[tuple[int, int], Scalar]] = []
         for odd in (False, True):
             a = _zeros(pattern, odd)
@@ -292,6 +301,8 @@ class _Krylov:
 
     def _compute(self, power: int, s: int, z: Scalar) -> dict[int, tuple[int, Scalar]]:
         if s:
+            # (A^2 + q) w = A^2 w + q w, each part known from one power of (A^2 + q) less. Where the sum vanishes for every x, by the exact
+            # pattern, it is not formed: in floating point it would be a rounding error.
             higher = self._plain(self.vector(power + 2, s - 1, z))
             for r, value in self._plain(self.vector(power, s - 1, z)).items():
                 rows = self.supports.get((power, s))
