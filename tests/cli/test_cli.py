@@ -13,6 +13,7 @@ from command_line import Done
 
 from lie_codegen import __version__
 from lie_codegen.cli.app import main
+from lie_codegen.codegen.numerics import NUMERICS_VERSION
 
 
 @pytest.fixture
@@ -185,7 +186,7 @@ def test_json_has_no_nan(cli) -> None:
 
 def test_manners_of_the_command_line(cli, tmp_path: Path) -> None:
     done = cli("--version")
-    assert done.stdout.strip() == f"lie-codegen {__version__}"
+    assert done.stdout.strip() == f"lie-codegen {__version__}, numerics {NUMERICS_VERSION}"
     assert "Usage" in cli("-h").stdout
     (tmp_path / "target.csv").write_text("1 0 0\n0, 0, -1\n0 1 0\n")
     by_file = cli("steer", "SO(3)", "--target", str(tmp_path / "target.csv"), "--controls", "w1,w2")

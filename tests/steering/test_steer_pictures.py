@@ -65,7 +65,7 @@ def test_loops_of_a_picture_are_labelled_with_their_areas() -> None:
     plan = lc.steer(lc.group("engel"), (0, 0, 0, 0.5), (0, 1), 1.0, method="loops")
     labels = [text.get_text() for text in draw_plan(plan).axes[1].get_legend().get_texts()]
     [moment] = plan.details["moments"].values()
-    assert any(f"moment {moment:.4g}, [a, [a, b]]" in label for label in labels)
+    assert any(f"moment {moment:.4g}, $[a, [a, b]]$" in label for label in labels)
 
 
 def test_a_picture_that_cannot_be_written_is_an_output_error(tmp_path: Path) -> None:
