@@ -71,6 +71,7 @@ def test_time_averages_of_random_systems(n, polynomial):
         assert errors[-1] < 20 * EPS[-1] ** order
 
 
+@pytest.mark.slow
 def test_the_fourth_order_of_a_random_system():
     errors = errors_in_time(2, False, (4,), 5)[4]
     assert slopes(errors)[0] > 3.8

@@ -180,7 +180,11 @@ def test_ends_inside_an_obstacle_are_refused_at_once_by_the_users_number() -> No
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [({"via": [0.5]}, "a pair"), ({"rate_bounds": (0.1, 0.5)}, "allow zero"), ({"longest": -1}, "positive multiple")],
+    [
+        ({"via": [0.5]}, "a pair"),
+        ({"rate_bounds": (0.1, 0.5)}, "allow zero"),
+        ({"objective": "time", "bounds": 1, "longest": -1}, "positive multiple"),
+    ],
 )
 def test_more_refusals(options: dict[str, object], words: str) -> None:
     with pytest.raises(SteeringInputError, match=words):
