@@ -72,6 +72,9 @@ def proved_hessian(gain: Array, inertia: Array, nabla: Array, level: float, boun
 
 def proved_transport(inertia: Array, nabla: Array, bound: float) -> bool:
     """Whether |nabla_Z X|_I <= bound |Z|_I |X|_I is proved; False says nothing."""
+    if np.array_equal(inertia, inertia[0, 0] * np.eye(3)):
+        # nabla_Z X = Z x X/2 here, so the supremum is 1/(2 sqrt I), attained for every Z: boxes would be cut for ever beside it.
+        return bool(bound * np.sqrt(inertia[0, 0]) >= 0.5 * (1 + _PAD))
     flat = np.array([[[f, 0], [-1, 1], [-1, 1], [0, 0]] for f in range(3)], dtype=float)
     return _proved(_TransportClaim(inertia, nabla, bound), flat, 0.0, (1, 2))
 

@@ -169,3 +169,16 @@ def test_invariances_are_computed() -> None:
     assert [row for row, each in which.items() if each.left] == [2, 3, 4]
     assert [row for row, each in which.items() if each.right] == [5]
     assert [row for row, each in which.items() if each.symmetric] == [1, 4, 5, 6]
+
+
+@pytest.mark.parametrize("moment", [1.0, 2.5])
+def test_equal_moments_have_closed_forms_within_the_proof(moment: float) -> None:
+    """I = c 1: b_1 = c/(lambda_min(A) - level), b_2 = c/lambda_max(A), t = 1/(2 sqrt c), A = tr(K) 1 - K."""
+    cert = lc.certificate("so3", inertia=moment, error="so3_right", gains=GAINS, level=1.0)
+    for proved, exact in (
+        (cert.b_1_proved, moment / (9 - 1)),
+        (1 / cert.b_2_proved, 11 / moment),
+        (cert.transport_proved, 0.5 / np.sqrt(moment)),
+    ):
+        assert exact <= proved <= 1.02 * exact
+    assert cert.theorem_rate_proved > 0
