@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -57,9 +58,7 @@ def _steering(only: str, json: bool) -> None:
     with progress("bench steering") as report:
         rows = bench_bounded(only=only, say=report)
     misses = missed(rows)
-    emit(table(rows, misses), {"rows": [asdict(row) for row in rows], "missed": misses}, json)
-    if misses:
-        raise typer.Exit(1)
+    _told(table(rows, misses), rows, misses, json)
 
 
 def _control(json: bool) -> None:
@@ -68,9 +67,7 @@ def _control(json: bool) -> None:
 
     with progress("bench control") as report:
         rows, missed = bench_control(say=report)
-    emit(table(rows, missed), {"rows": [asdict(row) for row in rows], "missed": missed}, json)
-    if missed:
-        raise typer.Exit(1)
+    _told(table(rows, missed), rows, missed, json)
 
 
 def _engines(only: str, json: bool) -> None:
@@ -79,9 +76,7 @@ def _engines(only: str, json: bool) -> None:
     with progress("bench engines") as report:
         rows = bench_engines(only=only, say=report)
     misses = missed(rows)
-    emit(table(rows, misses), {"rows": [asdict(row) for row in rows], "missed": misses}, json)
-    if misses:
-        raise typer.Exit(1)
+    _told(table(rows, misses), rows, misses, json)
 
 
 def _propagate(json: bool) -> None:
@@ -89,7 +84,12 @@ def _propagate(json: bool) -> None:
 
     with progress("bench propagate") as report:
         rows, missed = bench_propagate(report)
-    emit(table(rows, missed), {"rows": [asdict(row) for row in rows], "missed": missed}, json)
+    _told(table(rows, missed), rows, missed, json)
+
+
+def _told(text: str, rows: Sequence[Any], missed: Sequence[str], json: bool) -> None:
+    """The rows as a text or JSON; exit status 1 where a stated figure is missed."""
+    emit(text, {"rows": [asdict(row) for row in rows], "missed": missed}, json)
     if missed:
         raise typer.Exit(1)
 

@@ -1,4 +1,4 @@
-"""Limits of a force: every component clipped by itself, or the whole vector shortened so that its direction stays."""
+"""Limits of a force as numbers of a law, and any law with its force clipped to them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 
 from lie_codegen.errors import ShapeError
 from lie_codegen.exact.positive_matrix import positive_number
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Vector
 from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
+from lie_codegen.kernel.saturation import saturated
 from lie_codegen.on_demand import sympy as sp
 
 
@@ -65,29 +65,3 @@ def read_limits(limits: Any, size: int, name: str = "limits") -> list[sp.Expr]:
     if len(values) != size:
         raise ShapeError(f"{name}: {len(values)} limits for {size} components")
     return [positive_number(value, f"{name}[{i}]") for i, value in enumerate(values)]
-
-
-def saturated(ops: Arithmetic, vector: Sequence[Scalar], limits: Sequence[Scalar] | None = None) -> Vector:
-    """min(max(v, -limit), limit), component by component."""
-    if limits is None:
-        return list(vector)
-    result: Vector = []
-    for value, limit in zip(vector, limits, strict=True):
-        high = ops.constant(limit) if isinstance(limit, int) else limit
-        low = -high
-        clipped = ops.where(ops.less(high, value), high, value)
-        result.append(ops.where(ops.less(value, low), low, clipped))
-    return result
-
-
-def shortened(ops: Arithmetic, vector: Sequence[Scalar], limits: Sequence[Scalar]) -> Vector:
-    """s v with the largest s <= 1 that keeps every component within its limit: the direction stays.
-
-    So v . (s K v) keeps its sign for every positive K, which clipping the components one by one does not: with K not diagonal a clipped K v may
-    point against v.
-    """
-    longest: Scalar = ops.constant(1)
-    for value, limit in zip(vector, limits, strict=True):
-        ratio = ops.fabs(value) / limit
-        longest = ops.where(ops.less(longest, ratio), ratio, longest)
-    return [value / longest for value in vector]

@@ -16,7 +16,7 @@ from typing import Any
 
 from lie_codegen.control.error_catalogue import gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
-from lie_codegen.control.force_limits import force_limits, saturated
+from lie_codegen.control.force_limits import force_limits
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -27,6 +27,7 @@ from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, matvec, minus, plus, scaled
 from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
+from lie_codegen.kernel.saturation import saturated
 from lie_codegen.kernel.small_inverse import inverse
 
 #: Inputs of a tracking law before its numbers.

@@ -21,6 +21,7 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, plus, scaled
+from lie_codegen.kernel.saturation import saturated
 from lie_codegen.on_demand import sympy as sp
 
 _SOURCE = "Munthe-Kaas, BIT 38 (1998) 92; Bullo and Murray, CIT-CDS 97-003, (10)"
@@ -189,13 +190,7 @@ def called(
 
 def limited(ops: Arithmetic, loop: Loop, command: Vector, numbers: Mapping[str, Any]) -> Vector:
     """min(max(u, -limit), limit), component by component."""
-    if not loop.limited:
-        return list(command)
-    result = []
-    for value, high in zip(command, numbers["limits"], strict=True):
-        clipped = ops.where(ops.less(high, value), high, value)
-        result.append(ops.where(ops.less(value, -high), -high, clipped))
-    return result
+    return saturated(ops, command, numbers["limits"] if loop.limited else None)
 
 
 def moved(

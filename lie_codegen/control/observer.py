@@ -248,6 +248,7 @@ def corrections(
     units = [[int(a == b) for b in range(n)] for a in range(n)]
     grad: Vector = [0] * n
     inverse = matrices.inverse(X)
+    basis = [] if real.group.is_complex else [matrices.hat(unit) for unit in units]
     for c, row, weight in zip(vectors, y, weights, strict=True):
         if real.group.is_complex:
             v = matrices.Ad(X, inverse, row)
@@ -255,7 +256,7 @@ def corrections(
         else:
             # On SE(n) the last entry, 0 of a direction and 1 of a point, is no measurement.
             v = matvec(X, [*row[:seen], *c[seen:]])
-            turned = [matvec(matrices.hat(unit), v) for unit in units]
+            turned = [matvec(A, v) for A in basis]
         off = scaled(weight, minus(v, c))
         grad = plus(grad, [dot(each, off) for each in turned])
     back = matrices.Ad(inverse, X, grad)

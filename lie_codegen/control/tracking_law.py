@@ -27,7 +27,7 @@ from lie_codegen.control.compatibility import check_compatibility
 from lie_codegen.control.error_catalogue import error_names, gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_inputs import input_parameters
-from lie_codegen.control.force_limits import force_limits, shortened
+from lie_codegen.control.force_limits import force_limits
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -52,6 +52,7 @@ from lie_codegen.kernel.linear import (
     scaled,
 )
 from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
+from lie_codegen.kernel.saturation import shortened
 from lie_codegen.on_demand import sympy as sp
 
 #: The feedforwards by name.

@@ -12,6 +12,7 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import plus
 from lie_codegen.kernel.runge_kutta import CLASSICAL, increment, vectors
+from lie_codegen.kernel.saturation import saturated
 from lie_codegen.mechanics.vibrational_feedback import VibrationalFeedback
 from lie_codegen.mechanics.vibrational_fields import fast_time
 from lie_codegen.mechanics.vibrational_kernels import vibrational_kernels
@@ -50,7 +51,7 @@ def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int 
         (z,) = named["estimate"].evaluate(ops, y, where, eps, *parameters(ops, held))
         error = [a - float(b) for a, b in zip(z, design.equilibrium, strict=True)]
         alpha = [-sum(float(k) * e for k, e in zip(row, error, strict=True)) for row in design.K]
-        return ([_saturated(ops, a, design.limit) for a in alpha],)
+        return (saturated(ops, alpha, [design.limit] * na if np.isfinite(design.limit) else None),)
 
     def force(ops: Arithmetic, tau: Scalar, alpha: Any) -> tuple[Any, ...]:
         values = {**dict(zip(fields.parameters, parameters(ops, alpha), strict=True)), fast_time(): tau}
@@ -81,13 +82,6 @@ def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int 
                "u^a(tau; alpha) / eps", SOURCE),
         Kernel("loop", namespace, (state,), (following,), loop, "one step of the closed loop", SOURCE),
     )  # fmt: skip
-
-
-def _saturated(ops: Arithmetic, value: Scalar, limit: float) -> Scalar:
-    if not np.isfinite(limit):
-        return value
-    value = ops.where(ops.less(limit, value), limit, value)
-    return ops.where(ops.less(value, -limit), -limit, value)
 
 
 def closed_loop_start(design: VibrationalFeedback, y0: Any) -> list[float]:

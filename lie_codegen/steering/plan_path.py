@@ -10,8 +10,6 @@ from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.steering.direct.inputs import Drive
 from lie_codegen.steering.plan import Controls, Plan
 
-_ROUNDING = 1e-12
-
 
 def states(plan: Plan, t: Array) -> Array:
     """X (k, d, d) at increasing times (k,), the first zero.
@@ -20,7 +18,6 @@ def states(plan: Plan, t: Array) -> Array:
     of X, or from the left where the plan's system says so.
     """
     details = plan.details
-    t = _snapped(t, plan.u.breakpoints, plan.duration)
     start = details.get("start")
     if details.get("inertia") is not None:
         run = simulate_driven(plan.group, plan.u, details["inertia"], t=t, xi0=details["start_velocity"])
@@ -36,11 +33,3 @@ def states(plan: Plan, t: Array) -> Array:
     # the inverse of X' = hat(a) X is left-invariant: Y' = -Y hat(a)
     inverse = simulate(plan.group, velocity.scaled(-np.ones(plan.group.dim)), t=t, X0=np.linalg.inv(system.start)).X
     return np.asarray(np.linalg.inv(inverse))
-
-
-def _snapped(t: Array, marks: Array, duration: float) -> Array:
-    """The times, those that are a breakpoint but for rounding moved there: a jump must not lie within a step."""
-    if not len(marks):
-        return t
-    nearest = marks[np.argmin(np.abs(t[:, None] - marks), axis=1)]
-    return np.where(np.abs(t - nearest) <= _ROUNDING * duration, nearest, t)

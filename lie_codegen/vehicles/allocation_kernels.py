@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from lie_codegen.control.force_limits import force_limits, saturated
+from lie_codegen.control.force_limits import force_limits
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, matvec, minus, plus, scaled
 from lie_codegen.kernel.parameter import input_ports, sample_inputs, values_of
+from lie_codegen.kernel.saturation import saturated
 from lie_codegen.vehicles.allocation import Allocation
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import numpy as np
 import pytest
+from package_program import run_example
 from scipy.integrate import solve_ivp
 
 import lie_codegen as lc
@@ -133,27 +132,7 @@ def test_the_package_in_c(tmp_path):
     folder = lc.generate(list(system().kernels()), tmp_path / "out", name="phase_average")
     text = (folder / "src" / "phase_average.c").read_text()
     assert text.count("sin(") < 30  # nodes are looped over
-    subprocess.run(
-        [
-            "cc",
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Wshadow",
-            "-Wconversion",
-            "-Werror",
-            "-Iinclude",
-            "example.c",
-            "src/phase_average.c",
-            "-lm",
-            "-o",
-            "example",
-        ],
-        cwd=folder,
-        check=True,
-    )
-    subprocess.run(["./example"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    run_example(folder, "phase_average")
 
 
 def test_refusals():

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import numpy as np
 import pytest
 import sympy as sp
+from package_program import run_example
 from scipy.integrate import solve_ivp
 
 import lie_codegen as lc
@@ -118,27 +117,7 @@ def test_the_twin_and_the_package_in_c(tmp_path):
     np.testing.assert_allclose(evaluate(kernel, np.array([0.4, -0.3]))[0], slow.terms((0.4, -0.3)), atol=1e-15)
     folder = lc.generate(list(slow.kernels()), tmp_path / "out", name="time_average")
     assert len((folder / "src" / "time_average.c").read_text()) < 60_000  # nodes are looped over
-    subprocess.run(
-        [
-            "cc",
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Wshadow",
-            "-Wconversion",
-            "-Werror",
-            "-Iinclude",
-            "example.c",
-            "src/time_average.c",
-            "-lm",
-            "-o",
-            "example",
-        ],
-        cwd=folder,
-        check=True,
-    )
-    subprocess.run(["./example"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    run_example(folder, "time_average")
 
 
 def test_refusals():

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import numpy as np
 import pytest
+from package_program import run_example
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
@@ -273,27 +272,7 @@ def test_the_package_in_c(tmp_path):
         lc.torque.drag(debris(), lambda t: (1, t, 0), 0.1),
     ]
     folder = lc.generate(list(lc.tumbling_average(BODY, torques).kernels()), tmp_path / "out", name="tumbling")
-    subprocess.run(
-        [
-            "cc",
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Wpedantic",
-            "-Wshadow",
-            "-Wconversion",
-            "-Werror",
-            "-Iinclude",
-            "example.c",
-            "src/tumbling.c",
-            "-lm",
-            "-o",
-            "example",
-        ],
-        cwd=folder,
-        check=True,
-    )
-    subprocess.run(["./example"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    run_example(folder, "tumbling")
 
 
 def test_refusals():
