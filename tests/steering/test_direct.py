@@ -19,6 +19,8 @@ from lie_codegen.codegen.templates import template_folder
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.chain import end as chain_end
 from lie_codegen.steering.direct.compiled import machine
+from lie_codegen.steering.direct.flight import fly, landed
+from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.method import manoeuvre
 from lie_codegen.steering.direct.numpy_search import NumpySearch
 from lie_codegen.steering.direct.programme import Settings
@@ -69,6 +71,22 @@ def test_right_invariant_plans_are_flown_by_schroedingers_equation() -> None:
     plan = lc.steer(lc.group("su2"), 1j * HADAMARD, ("sx", "sy"), 6.0, equation="right", start=start, **QUBIT)
     assert np.max(np.abs(end_of_flight(plan, [0, 0, 1], start, right=True) - 1j * HADAMARD)) < 1e-8
     assert np.max(np.abs(end_of_flight(plan, [0, 0, 1], start) - 1j * HADAMARD)) > 1e-2
+
+
+@pytest.mark.parametrize("right", [False, True])
+@pytest.mark.parametrize("pieces", [1, 2, 7])
+def test_the_end_of_constant_pieces_is_their_product_in_order(pieces: int, right: bool) -> None:
+    group, rng = lc.group("su2"), np.random.default_rng(pieces)
+    start = expm(group.hat([0.3, -0.4, 0.2]))
+    task = manoeuvre(group, np.eye(2), ("sx", "sy"), 3.0, [0, 0, 1], 1, None, start, "right" if right else "left")
+    u, h = rng.uniform(-1, 1, (pieces, 2)), 3.0 / pieces
+    X = start
+    for row in u:
+        E = expm(h * group.hat([*row, 1.0]))
+        X = E @ X if right else X @ E
+    drive = Drive(task.system, Inputs.constant(np.linspace(0, 3, pieces + 1), u))
+    np.testing.assert_allclose(landed(drive), X, atol=1e-14)
+    np.testing.assert_allclose(fly(drive, 3)[1][-1], X, atol=1e-14)
 
 
 def test_goal_sets_cost_what_transversal_shooting_found() -> None:

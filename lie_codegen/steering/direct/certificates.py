@@ -8,11 +8,13 @@ X0^-1 T in that norm (Frobenius and spectral here, in all of U(d)). A column X e
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.goals import has_positions
 
@@ -61,10 +63,8 @@ def _vertices(task: Manoeuvre) -> Array | None:
 
 def _whole(task: Manoeuvre, speeds: Array) -> Certificate | None:
     """By a bi-invariant norm; of every variant of the goal, or there is no proof."""
-    end, basis = task.end, task.system.group.basis
-    if end.elements is None or len(end.before) or len(end.after):
-        return None
-    if not np.allclose(basis, -np.conj(np.swapaxes(basis, 1, 2)), atol=1e-12):
+    end = task.end
+    if end.elements is None or len(end.before) or len(end.after) or not _anti_hermitian(task.system.group):
         return None
     relative = np.linalg.solve(np.broadcast_to(task.system.start, end.elements.shape), end.elements)
     angles = np.abs(np.angle(np.linalg.eigvals(relative)))
@@ -75,6 +75,12 @@ def _whole(task: Manoeuvre, speeds: Array) -> Certificate | None:
     ):
         best = _stronger(best, _proof("distance", float(need), float(most) * task.duration))
     return best
+
+
+@lru_cache(maxsize=64)
+def _anti_hermitian(group: MatrixGroup) -> bool:
+    """Whether every velocity of the group is."""
+    return bool(np.allclose(group.basis, -np.conj(np.swapaxes(group.basis, 1, 2)), atol=1e-12))
 
 
 def _columns(task: Manoeuvre, speeds: Array) -> Certificate | None:

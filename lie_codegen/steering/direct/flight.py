@@ -17,12 +17,25 @@ _AGREE = 1e-13
 _MOST = 256
 
 
+def landed(drive: Drive) -> Array:
+    """(d, d) where the true system ends under the inputs of `drive`, drift included."""
+    if not _one_exponential(drive):
+        return np.asarray(fly(drive)[1][-1])
+    knots, system = drive.inputs.knots, drive.system
+    E = _exponentials(drive, knots[:-1], np.diff(knots))
+    # neighbours are multiplied side by side: six products of arrays for 48 pieces, not 48 of matrices
+    while len(E) > 1:
+        pairs = E[: len(E) - len(E) % 2].reshape(-1, 2, *E.shape[1:])
+        first, second = (1, 0) if system.right else (0, 1)
+        E = np.concatenate([pairs[:, first] @ pairs[:, second], E[2 * len(pairs) :]])
+    return np.asarray(E[0] @ system.start if system.right else system.start @ E[0])
+
+
 def fly(drive: Drive, parts: int = 1) -> tuple[Array, Array]:
     """Times (K parts + 1,) and states (K parts + 1, d, d) under the inputs of `drive`, drift included."""
     knots = drive.inputs.knots
-    steady = drive.system.steady and bool(np.all(drive.inputs.first == drive.inputs.last))
-    if steady:
-        return _states(drive, knots, parts, 1)  # one exponential a piece is exact
+    if _one_exponential(drive):
+        return _states(drive, knots, parts, 1)
     steps, (t, before) = 1, _states(drive, knots, parts, 1)
     while True:
         steps *= 2
@@ -35,17 +48,32 @@ def fly(drive: Drive, parts: int = 1) -> tuple[Array, Array]:
         before = after
 
 
+def _one_exponential(drive: Drive) -> bool:
+    """Whether the velocity is constant on each piece, so that one exponential of it is exact."""
+    return drive.system.steady and bool(np.all(drive.inputs.first == drive.inputs.last))
+
+
+def _exponentials(drive: Drive, t: Array, h: Array) -> Array:
+    """exp(h a) of the velocities a that hold from t on, as they act on X."""
+    sampled = Drive(drive.system, drive.inputs, True)
+    return expm(drive.system.group.hat(h[:, None] * sampled(t)))
+
+
 def _states(drive: Drive, knots: Array, parts: int, steps: int) -> tuple[Array, Array]:
     """States at every part of every piece, `steps` Magnus steps a part."""
-    system = drive.system
+    system, exact = drive.system, _one_exponential(drive)
     inner = np.arange(parts * steps) / (parts * steps)
     t0 = (knots[:-1, None] + np.diff(knots)[:, None] * inner).ravel()
     h = np.repeat(np.diff(knots) / (parts * steps), parts * steps)
-    sampled = Drive(system, drive.inputs, True)
-    a = [system.group.hat(h[:, None] * sampled(t0 + c * h)) for c in GAUSS]
-    if system.right:
-        a = [np.swapaxes(each, 1, 2) for each in a]
-    E = expm(from_gauss(_reversed_commutator, *a))
+    if exact:
+        E = _exponentials(drive, t0, h)
+        E = np.swapaxes(E, 1, 2) if system.right else E
+    else:
+        sampled = Drive(system, drive.inputs, True)
+        a = [system.group.hat(h[:, None] * sampled(t0 + c * h)) for c in GAUSS]
+        if system.right:
+            a = [np.swapaxes(each, 1, 2) for each in a]
+        E = expm(from_gauss(_reversed_commutator, *a))
     X = np.asarray(system.start, dtype=E.dtype)
     X = X.T if system.right else X
     states = [X]

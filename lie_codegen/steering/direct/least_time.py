@@ -22,7 +22,7 @@ from lie_codegen.errors import NotFiniteError, ShapeError, SteeringError, Steeri
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
 from lie_codegen.steering.direct.compiled import machine
-from lie_codegen.steering.direct.flight import fly
+from lie_codegen.steering.direct.flight import landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Settings, chosen
@@ -363,7 +363,7 @@ def _flown(
         durations, values = durations[::-1], values[::-1]
     knots = np.concatenate([[0.0], np.cumsum(durations)])
     inputs = Inputs.constant(knots, values)
-    X = fly(Drive(task.system, inputs))[1][-1]
+    X = landed(Drive(task.system, inputs))
     left, right = one.free_motions(u)
     miss = task.end.left @ left @ X @ right @ task.end.right - task.end.values[variant]
     sequence = tuple((*map(float, controls), float(s)) for controls, s in zip(values, durations, strict=True))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
 from lie_codegen.algebra.brackets import bracket
+from lie_codegen.arrays import Array
 from lie_codegen.errors import UncontrollableError
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.accessibility import closure, independent
 from lie_codegen.steering.direct.system import System
 from lie_codegen.steering.goals import End
@@ -26,9 +28,8 @@ def require_reach(system: System, duration: float, end: End) -> None:
     """
     group = system.group
     t = np.linspace(0.0, duration, 1 if system.steady else _SAMPLES)
-    rows = [system.directions_at(t).reshape(-1, group.dim), system.drift.at(t), end.before, end.after]
-    first = independent(np.vstack(rows[:2]))
-    filled = closure(first, partial(bracket, group.algebra), independent)
+    rows = [system.directions_at(t).reshape(-1, group.dim), system.drift.at(t)]
+    filled = _filled(group, np.vstack(rows).tobytes())
     if len(filled) == group.dim or end.elements is None or len(end.before) or len(end.after):
         return
     missing = np.eye(group.dim) - filled.T @ filled
@@ -38,3 +39,10 @@ def require_reach(system: System, duration: float, end: End) -> None:
         f"steer({group.name}): not controllable{helped}: the brackets of {', '.join(system.labels)} fill {len(filled)} of "
         f"{group.dim} dimensions; nothing moves along {', '.join(names)}; add a control in a missing direction"
     )
+
+
+@lru_cache(maxsize=64)
+def _filled(group: MatrixGroup, rows: bytes) -> Array:
+    """Orthonormal rows of what the brackets of velocities (k, n) fill: the same for every target of a system."""
+    first = independent(np.frombuffer(rows).reshape(-1, group.dim))
+    return closure(first, partial(bracket, group.algebra), independent)

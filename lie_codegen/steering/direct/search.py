@@ -118,6 +118,9 @@ def search(
         effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2))
         arrived = arrived[np.argsort(effort, kind="stable")[:_SIDE_BY_SIDE]]
     if settings.descend_iterations == 0:
+        # lanes that were left where they are when others had arrived would have to be restored first
+        whole = arrived[size[arrived] <= settings.enough]
+        arrived = whole if len(whole) else arrived
         effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2)) / 2
         best = int(np.argmin(effort))
         lane = arrived[best]

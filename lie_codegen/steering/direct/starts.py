@@ -21,23 +21,23 @@ def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> 
     middle, half = _box(task)
     s = (np.arange(pieces) + 0.5) / pieces
     waves = np.cos(np.pi * np.outer(s, np.arange(_WAVES)))
-    found = []
-    for lane in range(lanes):
-        size = _SIZES[(lane // 2 + round_) % len(_SIZES)]
-        smooth = waves @ rng.uniform(-1, 1, (_WAVES, task.controls))
-        white = rng.uniform(-1, 1, (pieces, task.controls))
-        # a motion to one side needs a mean: it is drawn apart from the wave
-        mean = rng.uniform(-1, 1, task.controls)
-        # white noise arrives where smooth waves stall at the bounds (gates in short time), and the other way round (one in four)
-        kind = (white, white + 0.3 * (smooth + mean), white)
-        if lane == 0 and round_ == 0:
-            found.append(np.zeros((pieces, task.controls)))
-        elif lane % 4 == 3:
-            # each whole turn that steady controls make is a valley of its own (rigid motions: costs up to twice as high without these)
-            found.append(middle + half * (mean + _UNSTEADY * white))
-        else:
-            found.append(middle + size * half * kind[lane % 4])
-    return np.clip(np.array(found), task.low, task.high)
+    sizes = np.array([_SIZES[(lane // 2 + round_) % len(_SIZES)] for lane in range(lanes)])
+    # one draw for all: of each lane the wave's amplitudes, white noise, and a mean, since a motion to one side needs one apart from the wave
+    drawn = np.split(
+        rng.uniform(-1, 1, (lanes, (_WAVES + pieces + 1) * task.controls)),
+        np.cumsum([_WAVES, pieces]) * task.controls,
+        1,
+    )
+    wave, white, mean = (each.reshape(lanes, -1, task.controls) for each in drawn)
+    found = np.array(white)
+    # white noise arrives where smooth waves stall at the bounds (gates in short time), and the other way round (one in four)
+    found[1::4] += 0.3 * (waves @ wave[1::4] + mean[1::4])
+    found = middle + sizes[:, None, None] * half * found
+    # each whole turn that steady controls make is a valley of its own (rigid motions: costs up to twice as high without these)
+    found[3::4] = middle + half * (mean[3::4] + _UNSTEADY * white[3::4])
+    if round_ == 0:
+        found[0] = 0
+    return np.clip(found, task.low, task.high)
 
 
 def with_free_slots(task: Manoeuvre, u: Array, seed: int) -> Array:
