@@ -129,7 +129,8 @@ def closed_loop(
             states of its own (z with an output z_dot, q with an output q_next, X_hat with an output u_hat) and numbers; or
             something with such a kernel as `.kernel`. None for an uncontrolled body.
         inertia: of the body, symmetric positive definite: a number, a diagonal or a matrix, which is compiled in; or (N, n, n),
-            one a loop: then it is an input of one compiled step. A law that commands the velocity needs none.
+            one a loop: then it is an input of one compiled step. Left away, it is the inertia that the law was made with. A law that
+            commands the velocity needs none.
         gains: values of the law's numbers that are inputs (`k_p="input"`): name -> a number, or one a loop, (N, *shape). A
             law's `inertia` is that of the body unless it is given here.
         reference: what `lc.reference` makes or takes: a reference, a plan, formulas of t; or one element, to rest at. An attitude law follows it by its

@@ -177,6 +177,8 @@ def _plant(group: Any, law: LoopLaw | None, inertia: Any, gains: Mapping[str, An
         group = law.kernel.namespace
     group = as_group(group, "closed_loop")
     if law is None or law.order == 2 or (law.order is None and inertia is not None):
+        if inertia is None and law is not None:
+            inertia = _designed_for(law.kernel)
         several = not isinstance(inertia, str) and np.ndim(inertia) == 3
         return group_plant(group, "input") if several else _known_plant(group, plain(inertia))
     if law.order is None:
@@ -185,6 +187,12 @@ def _plant(group: Any, law: LoopLaw | None, inertia: Any, gains: Mapping[str, An
             "force or torque; or give order=, or inertia= of the body that it pushes"
         )
     return group_plant(group, order=1)
+
+
+def _designed_for(law: Kernel) -> Any:
+    """The inertia that a law was made with: unless told otherwise, it flies the body that it was designed for. None where it is an input."""
+    inertia = law.definition.get("parameters", {}).get("inertia") if law.definition else None
+    return None if isinstance(inertia, str) else inertia
 
 
 @lru_cache(maxsize=64)

@@ -4,25 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, write_refusal
+from lie_codegen.errors import InputError
 from lie_codegen.pictures.plot_plan import picture_path
-from lie_codegen.pictures.result import new_figure
+from lie_codegen.pictures.result import new_figure, write_figure
 
 _BLUE, _GREY, _RED = "#31688e", "#8a8a8a", "#b5483a"
 
 
-def plot_loops(run: Any, path: str | Path, *, band: Sequence[float] = (5, 95)) -> Path:
+@overload
+def plot_loops(run: Any, path: None = None, *, band: Sequence[float] = (5, 95)) -> Any: ...
+
+
+@overload
+def plot_loops(run: Any, path: str | Path, *, band: Sequence[float] = (5, 95)) -> Path: ...
+
+
+def plot_loops(run: Any, path: str | Path | None = None, *, band: Sequence[float] = (5, 95)) -> Any:
     """Draws the error of closed loops over time into a file (png, svg, pdf): median, band, and the worst; below, the size of their
-    commands. Returns its path.
+    commands. Returns its path; without one the figure, which a notebook shows.
 
     Args:
         run: what `lc.closed_loop` or the loop of `lc.momentum_wheels` gives: t, error (k,) or (k, N), and u or torques (k, .., m).
-        path: the file.
+        path: the file, or None.
         band: percentiles between which the band lies.
 
     Raises:
@@ -30,7 +38,7 @@ def plot_loops(run: Any, path: str | Path, *, band: Sequence[float] = (5, 95)) -
         MissingDependencyError: without matplotlib.
         OutputFolderError: the file cannot be written.
     """
-    target = picture_path(path)
+    target = None if path is None else picture_path(path)
     t, error = np.asarray(getattr(run, "t", ())), getattr(run, "error", None)
     if error is None or len(t) != len(error):
         raise InputError(f"plot_loops takes a closed loop with its error, got {type(run).__name__}")
@@ -48,12 +56,7 @@ def plot_loops(run: Any, path: str | Path, *, band: Sequence[float] = (5, 95)) -
     if rows[0].get_legend_handles_labels()[1]:
         rows[0].legend(frameon=False, loc="upper right")
     rows[-1].set_xlabel("t [s]")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(target, dpi=150)
-    except OSError as failure:
-        raise write_refusal(f"{target}: cannot be written", failure) from None
-    return target
+    return figure if target is None else write_figure(figure, target)
 
 
 def _turns(run: Any) -> bool:

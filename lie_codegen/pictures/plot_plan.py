@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, overload
 
-from lie_codegen.errors import InputError, write_refusal
+from lie_codegen.errors import InputError
+from lie_codegen.pictures.result import write_figure
 from lie_codegen.pictures.steering_picture import draw_plan
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.front import steer
@@ -27,12 +29,23 @@ def picture_path(path: str | Path) -> Path:
     return target
 
 
-def plot_plan(plan: Plan, path: str | Path, *, obstacles: Sequence[Obstacle] = (), compare: bool = True) -> Path:
-    """Draws controls, loops, path and energy into a file (png, svg, pdf); returns its path.
+@overload
+def plot_plan(plan: Plan, path: None = None, *, obstacles: Sequence[Obstacle] = (), compare: bool = True) -> Any: ...
+
+
+@overload
+def plot_plan(plan: Plan, path: str | Path, *, obstacles: Sequence[Obstacle] = (), compare: bool = True) -> Path: ...
+
+
+def plot_plan(
+    plan: Plan, path: str | Path | None = None, *, obstacles: Sequence[Obstacle] = (), compare: bool = True
+) -> Any:
+    """Draws controls, loops, path and energy into a file (png, svg, pdf) and returns its path; without one, returns the figure,
+    which a notebook shows.
 
     Args:
         plan: any plan of `lc.steer`.
-        path: the file.
+        path: the file, or None.
         obstacles: drawn with the path.
         compare: solve for the least energy without limits, for the comparison.
 
@@ -41,14 +54,10 @@ def plot_plan(plan: Plan, path: str | Path, *, obstacles: Sequence[Obstacle] = (
         InputError: the name of the file ends in no kind of picture.
         OutputFolderError: the file cannot be written.
     """
-    target = picture_path(path)
+    target = None if path is None else picture_path(path)
     minimum = plan.cost if plan.method == "optimal" else None
     same_system = not any(plan.details.get("drift", ())) and "inertia" not in plan.details
     if compare and minimum is None and same_system:
         minimum = steer(plan.group, plan.target, plan.controls, plan.duration, "optimal").cost
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        draw_plan(plan, minimum, obstacles).savefig(target, dpi=150)
-    except OSError as error:
-        raise write_refusal(f"{target}: cannot be written", error) from None
-    return target
+    figure = draw_plan(plan, minimum, obstacles)
+    return figure if target is None else write_figure(figure, target)

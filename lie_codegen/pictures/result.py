@@ -72,9 +72,9 @@ def write_figure(figure: Any, path: Path) -> Path:
     """The figure in the format of the path's ending."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=150, metadata=FORMATS[path.suffix[1:]])
+        figure.savefig(path, dpi=150, metadata=FORMATS[path.suffix[1:].lower()])
     except OSError as error:
-        raise write_refusal(f"{path.parent}: cannot be written", error) from None
+        raise write_refusal(f"{path}: cannot be written", error) from None
     return path
 
 
@@ -93,15 +93,15 @@ def save(name: str, folder: Path, figure: Any, numbers: Mapping[str, Any]) -> Ga
 
 
 def new_figure(width: float, height: float) -> Any:
-    """A matplotlib Figure that needs no display.
+    """A matplotlib Figure that needs no display, and that a notebook shows.
 
     Raises:
         MissingDependencyError: without matplotlib.
     """
     try:
-        from matplotlib.figure import Figure
+        from lie_codegen.pictures.shown_figure import ShownFigure
     except ImportError:
         raise MissingDependencyError(
             "pictures need matplotlib: install lie_codegen with its extra, lie_codegen[plot]"
         ) from None
-    return Figure(figsize=(width, height), layout="constrained")
+    return ShownFigure(figsize=(width, height), layout="constrained")

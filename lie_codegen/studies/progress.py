@@ -30,7 +30,9 @@ def bar(progress: bool | Tell | None) -> Iterator[Tell]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+    # plain text in a notebook too: the widget that rich would show there needs another package, and stays in the page afterwards
+    console = Console(stderr=True, force_jupyter=False)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+    with Progress(*columns, console=console, transient=True) as shown:
         task = shown.add_task("study", total=None)
         yield lambda done, total: shown.update(task, completed=done, total=total)

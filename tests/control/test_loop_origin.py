@@ -78,3 +78,16 @@ def test_a_file_makes_nothing_but_what_this_package_makes() -> None:
     text = run.origin.loop.replace("lie_codegen.control.plants:group_plant", "os:system")
     with pytest.raises(InputError, match="no value of this package"):
         replace(run, origin=replace(run.origin, loop=text)).at(0.3)
+
+
+def test_a_law_flies_the_body_it_was_made_for_unless_told_otherwise() -> None:
+    """Its own inertia beside the same given by hand: the same loop to the last bit; a number that is an input has to be given."""
+    inertia = [[2, 0.1, 0], [0.1, 3, 0], [0, 0, 1.5]]
+    law = lc.attitude_law("pd", inertia=inertia, k_p=4, k_d=6)
+    start = {"X0": lc.build("so3").exp([0.2, -0.1, 0.3]), "t": np.linspace(0, 3, 4)}
+    np.testing.assert_array_equal(
+        lc.closed_loop(law=law, **start).X, lc.closed_loop("so3", law=law, inertia=inertia, **start).X
+    )
+    assert np.abs(lc.closed_loop(law=law, inertia=1, **start).X - lc.closed_loop(law=law, **start).X).max() > 1e-3
+    with pytest.raises(InputError, match="inertia"):
+        lc.closed_loop(law=lc.attitude_law("pd", inertia="input", k_p=4, k_d=6), **start)
