@@ -1,13 +1,13 @@
 /*
  * Ordinary differential equations y' = f(t, y) of compiled kernels: steps of order 8(5, 3) with error control, events, and
- * plain steps of order 4. The solution between two knots is a fresh, shorter step from the first: as exact as the steps are,
- * and no interpolant is needed. Plain C99, no allocation: the caller gives the workspace.
+ * plain steps of order 4. The solution between two knots is a fresh, shorter step from the first, or, of several times in one step, a
+ * polynomial that a fresh step has checked. Plain C99, no allocation: the caller gives the workspace.
  */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-#include "pair_step.h"
+#include "pair_dense.h"
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
@@ -15,6 +15,8 @@
 #define EXPORT
 #endif
 
+/* So many times within a step are worth the three slopes of its polynomial and the step that checks it. */
+enum { FEWEST_DENSE = 4 };
 enum { MOST_PORTS = 32, REACHED = 0, EVENT = 1, FULL = 2, STUCK = 3 };
 
 typedef void (*kernel_call)(const double *const *, double *const *);
@@ -40,7 +42,7 @@ typedef struct {
 EXPORT ptrdiff_t lie_codegen_ode_work(ptrdiff_t size, ptrdiff_t events);
 EXPORT ptrdiff_t lie_codegen_ode_work(ptrdiff_t size, ptrdiff_t events)
 {
-    return (STAGES + 5) * size + 3 * (events + 1);
+    return (DENSE_STAGES + DENSE_TERMS + 3) * size + 3 * (events + 1);
 }
 
 static int evaluate(const Field *field, double t, const double *y, double *result)
@@ -270,18 +272,118 @@ EXPORT int lie_codegen_ode_run(const Field *field, const Field *events, const Ru
     return status;
 }
 
-/* The solution at `count` times, each from the last knot at or before it (`knot`, in the sense of the run). */
-EXPORT int lie_codegen_ode_at(const Field *field, const double *times, const double *states, ptrdiff_t count, const double *wanted, const ptrdiff_t *knot, double *found, double *work);
-EXPORT int lie_codegen_ode_at(const Field *field, const double *times, const double *states, ptrdiff_t count, const double *wanted, const ptrdiff_t *knot, double *found, double *work)
+/* A fresh step from (from, y) to time t. */
+static int fresh(const Field *field, double from, const double *y, double t, double *found, double *k)
+{
+    if (t == from) {
+        memcpy(found, y, (size_t)field->size * sizeof *y);
+        return 0;
+    }
+    return evaluate(field, from, y, k) || step(field, from, y, t - from, k, found);
+}
+
+/*
+ * Times between `from` and `to`, whose states are y and `after`, on one polynomial. miss: by how much, in units of what is allowed, it
+ * misses a fresh step to the time nearest to its middle, where it is least exact.
+ */
+static int on_polynomial(const Field *field, double from, const double *y, double to, const double *after, ptrdiff_t count, const double *wanted, const double *allowed, double *found, double *miss, double *work)
 {
     const ptrdiff_t n = field->size;
-    ptrdiff_t i;
+    const double h = to - from;
+    double *k = work, *stage = k + DENSE_STAGES * n, *F = stage + n, farthest = -1.0;
+    ptrdiff_t i, middle = 0;
+    if (evaluate(field, from, y, k) || step(field, from, y, h, k, stage)
+        || pair_dense(slope_of, field, n, from, y, h, after, k, stage, F)) {
+        return 1;
+    }
     for (i = 0; i < count; ++i) {
-        const double t = times[knot[i]], *y = states + knot[i] * n;
-        if (wanted[i] == t) {
-            memcpy(found + i * n, y, (size_t)n * sizeof *y);
-        } else if (evaluate(field, t, y, work) || step(field, t, y, wanted[i] - t, work, found + i * n)) {
+        const double x = (wanted[i] - from) / h;
+        pair_dense_at(n, y, F, x, found + i * n);
+        if (x * (1.0 - x) > farthest) {
+            farthest = x * (1.0 - x);
+            middle = i;
+        }
+    }
+    if (fresh(field, from, y, wanted[middle], stage, k)) {
+        return 1;
+    }
+    *miss = 0.0;
+    for (i = 0; i < n; ++i) {
+        const double off = fabs(stage[i] - found[middle * n + i]);
+        if (!(off <= *miss * allowed[i])) {
+            *miss = off / allowed[i];
+        }
+    }
+    return 0;
+}
+
+/* Ordered times in the step behind a knot: on a polynomial over the whole of it, or over as much of it as it is exact for. */
+static int within(const Field *field, const double *times, const double *states, ptrdiff_t knot, ptrdiff_t count, const double *wanted, const double *allowed, double *found, double *work)
+{
+    const ptrdiff_t n = field->size;
+    const double end = times[knot + 1], way = end > times[knot] ? 1.0 : -1.0;
+    double *y = work, *after = y + n, *rest = after + n, t = times[knot], to = end, last = HUGE_VAL;
+    int helps = 1; /* 0: a shorter piece misses no less, for rounding or a kink; then every time is a fresh step */
+    memcpy(y, states + knot * n, (size_t)n * sizeof *y);
+    while (count > 0) {
+        const double length = to - t;
+        double miss = 0.0;
+        ptrdiff_t piece = 0, i;
+        while (piece < count && way * (wanted[piece] - to) <= 0.0) {
+            ++piece;
+        }
+        if (to == end) {
+            memcpy(after, states + (knot + 1) * n, (size_t)n * sizeof *after);
+        } else if (fresh(field, t, y, to, after, rest)) {
             return 1;
+        }
+        if (helps && piece >= FEWEST_DENSE) {
+            if (on_polynomial(field, t, y, to, after, piece, wanted, allowed, found, &miss, rest)) {
+                return 1;
+            }
+            if (!(miss <= 1.0)) {
+                helps = miss < 0.5 * last;
+                to = t + length * fmax(0.2, 0.8 * pow(miss, -1.0 / 8.0));
+                last = miss;
+                continue;
+            }
+        } else {
+            for (i = 0; i < piece; ++i) {
+                if (fresh(field, t, y, wanted[i], found + i * n, rest)) {
+                    return 1;
+                }
+            }
+        }
+        memcpy(y, after, (size_t)n * sizeof *y);
+        t = to;
+        to = way * (end - t - 1.5 * length) > 0.0 ? t + 1.5 * length : end;
+        last = HUGE_VAL;
+        count -= piece;
+        wanted += piece;
+        found += piece * n;
+    }
+    return 0;
+}
+
+/* The solution at `count` ordered times, each from the last of the knots at or before it (`knot`, in the sense of the run). */
+EXPORT int lie_codegen_ode_at(const Field *field, const double *times, const double *states, ptrdiff_t knots, ptrdiff_t count, const double *wanted, const ptrdiff_t *knot, const double *allowed, double *found, double *work);
+EXPORT int lie_codegen_ode_at(const Field *field, const double *times, const double *states, ptrdiff_t knots, ptrdiff_t count, const double *wanted, const ptrdiff_t *knot, const double *allowed, double *found, double *work)
+{
+    const ptrdiff_t n = field->size;
+    ptrdiff_t i, next;
+    for (i = 0; i < count; i = next) {
+        for (next = i + 1; next < count && knot[next] == knot[i]; ++next) {
+        }
+        if (next - i >= FEWEST_DENSE && knot[i] + 1 < knots) {
+            if (within(field, times, states, knot[i], next - i, wanted + i, allowed, found + i * n, work)) {
+                return 1;
+            }
+            continue;
+        }
+        for (; i < next; ++i) {
+            if (fresh(field, times[knot[i]], states + knot[i] * n, wanted[i], found + i * n, work)) {
+                return 1;
+            }
         }
     }
     return 0;

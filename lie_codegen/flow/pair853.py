@@ -20,7 +20,7 @@ from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, ComputationError
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.call import Compiled
-from lie_codegen.runtime.ode import pair_headers
+from lie_codegen.runtime.pair_headers import pair_headers
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import share_out
 

@@ -104,7 +104,7 @@ def _piece(
     rate = model.field("slow_rate", size, "y", {**constants, "carry": float(wishes.osculating)})
     ends = Field(model.library["ends"], size, time=None, constants={"inertia": axes.inertia, "least": 1e-9 * scale})
     # the phases drive nothing: they are carried along and never shorten a step
-    atol = np.array([scale * rtol] * 3 + [scale**2 * rtol, 1e300, 1e300])
+    atol = np.array([scale * rtol] * 3 + [scale**2 * rtol, np.inf, np.inf])
     motion = integrate(rate, y, t[0], t[-1], rtol=rtol, atol=atol, events=ends, directions=(-1, -1))
     kept = t[t <= motion.t[-1]]
     found = motion.at(kept)

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, ComputationError, InputError, ShapeError
-from lie_codegen.runtime import dop853, ode_numpy
+from lie_codegen.runtime import ode_numpy
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.pair_headers import dense_headers, pair_headers
 from lie_codegen.runtime.sources import build_source
 
 #: Results of a run: reached the end, an event, more knots are wanted, no step is short enough.
@@ -130,7 +131,11 @@ class Field:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A solution between t[0] and t[-1]: the knots of the steps, and any time between by a fresh partial step.
+    """A solution between t[0] and t[-1]: the knots of the steps, and any time between.
+
+    A time alone in its step is a fresh, shorter step, as exact as the steps are. Where a step holds several, they lie on the
+    pair's polynomial of order 7, which costs no more for a thousand than for four; one of them is taken by a fresh step too, and
+    where the two differ by more than `allowed` the polynomial is taken over less of the step.
 
     Attributes:
         t: (K,) knots, monotone.
@@ -138,6 +143,7 @@ class Motion:
         status: REACHED or EVENT, or STUCK where no step was short enough or f had no finite value.
         event: number of the event that ended it; -1 if none.
         evaluations: of f.
+        allowed: (n,) error of y that a step may have; where none was asked for (atol infinite), rtol of the largest |y|.
     """
 
     t: Array
@@ -145,6 +151,7 @@ class Motion:
     status: int
     event: int
     evaluations: int
+    allowed: Array
     field: Field = field(repr=False)
 
     def at(self, t: ArrayLike) -> Array:
@@ -156,6 +163,11 @@ class Motion:
         wanted = np.asarray(t, dtype=float)
         flat = np.ascontiguousarray(wanted.ravel())
         sign = 1.0 if self.t[-1] >= self.t[0] else -1.0
+        if np.any(sign * flat[1:] < sign * flat[:-1]):
+            order = np.argsort(sign * flat, kind="stable")
+            found = np.empty((flat.size, self.field.size))
+            found[order] = self.at(flat[order])
+            return found.reshape((*wanted.shape, self.field.size))
         slack = 1e-12 * max(1.0, float(np.max(np.abs(self.t))))
         if flat.size and (
             np.min(sign * flat) < sign * self.t[0] - slack or np.max(sign * flat) > sign * self.t[-1] + slack
@@ -172,8 +184,8 @@ class Motion:
         else:
             work = np.empty(int(library.lie_codegen_ode_work(self.field.size, 0)))
             library.lie_codegen_ode_at(
-                ctypes.byref(self.field.record), *_pointers(self.t, self.y), ctypes.c_ssize_t(flat.size),
-                *_pointers(flat, knot, found, work),
+                ctypes.byref(self.field.record), *_pointers(self.t, self.y), ctypes.c_ssize_t(len(self.t)), ctypes.c_ssize_t(flat.size),
+                *_pointers(flat, knot, self.allowed, found, work),
             )  # fmt: skip
             self.field.raise_pending()
         return found.reshape((*wanted.shape, self.field.size))
@@ -208,11 +220,11 @@ def integrate(
     y0 = np.array(start, dtype=float).ravel()
     tolerance = np.ascontiguousarray(np.broadcast_to(np.asarray(atol, dtype=float), y0.shape))
     if t0 == t1:
-        return Motion(np.array([t0]), y0[None], REACHED, -1, 0, rate)
+        return Motion(np.array([t0]), y0[None], REACHED, -1, 0, _allowed(y0[None], rtol, tolerance), rate)
     library = _library()
     if library is None or _only_python(rate, events):
         found = ode_numpy.run(rate, y0, t0, t1, rtol, tolerance, events, directions, longest)
-        return Motion(*found, rate)
+        return Motion(*found, _allowed(found[1], rtol, tolerance), rate)
     wanted = np.array([*directions, 0], dtype=np.intp)
     rules = _Rules(rtol, tolerance.ctypes.data, 0.0, longest, wanted.ctypes.data, len(directions))
     work = np.empty(int(library.lie_codegen_ode_work(rate.size, len(directions))))
@@ -235,7 +247,8 @@ def integrate(
         evaluations, rules.first, held = evaluations + int(result[3]), result[1], held + kept - 1
         if status != FULL:
             event = int(result[2]) if status == EVENT else -1
-            return Motion(np.concatenate(pieces_t), np.concatenate(pieces_y), status, event, evaluations, rate)
+            t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
+            return Motion(t, y, status, event, evaluations, _allowed(y, rtol, tolerance), rate)
         ahead = (kept - 1) * abs(t1 - times[kept - 1]) / max(abs(times[kept - 1] - times[0]), 5e-324)
         # Where the steps still shrink they go towards an end of the solution, and will soon be refused there.
         steady = abs(times[kept - 1] - times[kept - 2]) > 0.5 * abs(times[1] - times[0])
@@ -263,6 +276,10 @@ def fixed_steps(rate: Field, start: ArrayLike, t0: float, h: float, spans: int, 
     return states
 
 
+def _allowed(y: Array, rtol: float, atol: Array) -> Array:
+    return np.asarray(np.where(np.isinf(atol), 0.0, atol) + rtol * np.abs(y).max(axis=0))
+
+
 def _is_kernel(rate: Any) -> TypeGuard[Compiled[Any]]:
     """Whether it is a compiled kernel, behind the extension type or not."""
     return hasattr(rate, "signature") and hasattr(rate, "backend")
@@ -283,28 +300,12 @@ def _pointers(*arrays: Array | NDArray[np.intp]) -> list[ctypes.c_void_p]:
     return [ctypes.c_void_p(np.ascontiguousarray(each).ctypes.data) for each in arrays]
 
 
-def table_header() -> str:
-    """The pair's coefficients as C."""
-    rows = ["static const double A[STAGES][STAGES] = {"]
-    rows += [f"    {{ {', '.join(repr(row.get(j, 0.0)) for j in range(len(dop853.A)))} }}," for row in dop853.A]
-    rows.append("};")
-    for name, values in (("B", dop853.B), ("C", dop853.C), ("E3", dop853.E3), ("E5", dop853.E5)):
-        rows.append(f"static const double {name}[STAGES] = {{ {', '.join(map(repr, values))} }};")
-    return "\n".join([f"enum {{ STAGES = {len(dop853.A)} }};", *rows, ""])
-
-
-def pair_headers() -> dict[str, str]:
-    """The headers of one step of the pair 8(5, 3), which ode.c and pair853.c include."""
-    step = (template_folder() / "pair_step.h").read_text(encoding="utf-8")
-    return {"pair_step.h": step, "ode_table.h": table_header()}
-
-
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL | None:
     """The compiled loops; None where there is no compiler."""
 
     def files() -> dict[str, str]:
-        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), **pair_headers()}
+        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), **pair_headers(), **dense_headers()}
 
     try:
         path = build_source(files, "ode.c", namespace="lie_codegen_ode", definition="ode")

@@ -42,9 +42,57 @@ def test_elliptic_functions_at_any_time():
 def test_a_single_step_is_of_order_eight():
     errors = []
     for h in (0.4, 0.2):
-        knots = Motion(np.array([0.0, 1.0]), np.array([[0.0, 1, 1], [0, 1, 1]]), REACHED, -1, 0, top())
+        knots = Motion(np.array([0.0, 1.0]), np.array([[0.0, 1, 1], [0, 1, 1]]), REACHED, -1, 0, np.ones(3), top())
         errors.append(abs(knots.at(h)[0] - ellipj(h, 0.25)[0]))  # one step of length h from the first knot
     assert 8 < np.log2(errors[0] / errors[1]) < 10
+
+
+def counted(rate, size):
+    """A Python function of C's loops, and how often it was called."""
+    calls = []
+
+    def call(t, y):
+        calls.append(t)
+        return rate(t, y)
+
+    return Field(call, size), calls
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+def test_many_times_in_a_step_lie_on_its_polynomial(rtol):
+    """A thousand times cost no more than a few steps, are as exact as the steps, and in any order, either way in time."""
+    rate = top()
+    field, calls = counted(rate, 3)
+    for start, t0, t1 in (([0, 1, 1], 0.0, 20.0), (np.stack(ellipj(20.0, 0.25)[:3]), 20.0, 0.0)):
+        motion = integrate(field, start, t0, t1, rtol=rtol, atol=rtol)
+        knots = len(motion.t)
+        calls.clear()
+        t = np.random.default_rng(3).permutation(np.linspace(0, 20, 20_001))
+        found = motion.at(t)
+        assert len(calls) < 80 * knots
+        ends = np.abs(motion.y - np.stack(ellipj(motion.t, 0.25)[:3], axis=1)).max()
+        assert np.abs(found - np.stack(ellipj(t, 0.25)[:3], axis=1)).max() < 1.5 * ends + 4 * rtol
+        np.testing.assert_array_equal(motion.at(motion.t), motion.y)
+
+
+def test_a_kink_within_a_step_is_no_polynomial():
+    """Where the rate has a kink the polynomial is taken on either side of it, or fresh steps are."""
+    field, _ = counted(lambda t, y: np.array([abs(np.sin(3 * t))]), 1)
+    motion = integrate(field, [0.0], 0.0, 6.0, rtol=1e-10, atol=1e-10)
+    t = np.linspace(0, 6, 3001)
+    turns = np.floor(3 * t / np.pi)
+    exact = (2 * turns + 1 - np.cos(3 * t - turns * np.pi)) / 3
+    assert np.abs(motion.at(t)[:, 0] - exact).max() < 1e-8
+
+
+def test_entries_without_an_error_of_their_own():
+    """atol infinite: such an entry shortens no step, and still is given to rtol of its size."""
+    field, _ = counted(lambda t, y: np.array([-y[0], 40 * np.cos(40 * t)]), 2)
+    motion = integrate(field, [1.0, 0.0], 0.0, 2.0, rtol=1e-6, atol=[1e-6, np.inf])
+    free = integrate(field, [1.0, 0.0], 0.0, 2.0, rtol=1e-6, atol=[1e-6, 1e-6])
+    assert len(motion.t) < len(free.t)
+    t = np.linspace(0, 2, 501)
+    np.testing.assert_allclose(motion.at(t)[:, 0], np.exp(-t), atol=3e-6)
 
 
 @pytest.mark.usefixtures("loops")
