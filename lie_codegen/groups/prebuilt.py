@@ -4,7 +4,7 @@
     prebuilt/<name>.json.xz    the sources of each kernel of the group; the functions of the package that ran to make them
     prebuilt/lanes.json.xz     the file they all include
 
-What was made by other code than this package's, or of another definition, is not used. Written by tests/tools/prebuild.py.
+What was made by other code than this package's, or of another definition, is not used; what is damaged is not either, after a warning. Written by tests/tools/prebuild.py.
 Each group is judged by itself, by the functions that ran (codegen/made_from.py). That takes a fifth of a second, and is
 not done where all files are, to the byte, those at the time of writing, as in an installed package.
 """
@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lie_codegen.runtime.degraded import warn_degraded
 from lie_codegen.runtime.digests import digest
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 SHARED, SHARED_STORE = "lie_codegen_lanes.h", "lanes"
 #: What becomes C text beside the functions.
 TEMPLATES = ("binding.c.jinja", "header.h.jinja", "lanes.h.jinja", "macros.jinja", "source.c.jinja")
+_NOT_USED = "the C that ships with the package is damaged and not used: groups are derived again (the same results, seconds later; install it anew)"
 _PACKAGE = Path(__file__).resolve().parent.parent
 
 
@@ -55,19 +57,37 @@ class Prebuilt:
 def find_prebuilt(definition: str, folder: Path | None = None) -> Prebuilt | None:
     """The sources of that definition; None where there are none, or none that are current and whole."""
     home = prebuilt_folder() if folder is None else folder
+    if not (home / "index.json").is_file():
+        return None
     try:
-        index = json.loads((home / "index.json").read_bytes())
+        index = _read_index(home)
         name = index["definitions"].get(digest(definition))
         if name is None:
             return None
         data, shared = (_unpacked(home, each, index["stores"][each]) for each in (name, SHARED_STORE))
-        if file_digest(index["files"]) != index["sha256"] and (
-            made_from_digest(data["made_from"]) != index["made_from"][name]
-        ):
-            return None
-        return Prebuilt(str(data["namespace"]), tuple(data["kernels"]), data["kernels"], shared)
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError, SyntaxError):
+        found = Prebuilt(str(data["namespace"]), tuple(data["kernels"]), data["kernels"], shared)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, ImportError) as error:
+        warn_degraded(_NOT_USED, str(error))
         return None
+    try:
+        if file_digest(index["files"]) == index["sha256"]:
+            return found
+        return found if made_from_digest(data["made_from"]) == index["made_from"][name] else None
+    except (OSError, LookupError, TypeError, AttributeError, ImportError, SyntaxError):
+        return None
+
+
+def sealed(index: Mapping[str, Any]) -> dict[str, Any]:
+    """The index with a digest of itself: one changed character, and another group's C might be taken for that of a definition."""
+    plain = {name: value for name, value in index.items() if name != "seal"}
+    return {**plain, "seal": digest(plain)}
+
+
+def _read_index(home: Path) -> Any:
+    index = json.loads((home / "index.json").read_bytes())
+    if not isinstance(index, dict) or sealed(index) != index:
+        raise ValueError("prebuilt/index.json is not as it was written")
+    return index
 
 
 def prebuilt_folder() -> Path:

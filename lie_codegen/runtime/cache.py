@@ -5,7 +5,8 @@
     <cache>/requests/<digest>.json           a request (definition, options, versions) -> an entry
     <cache>/locks/<digest>.lock
 
-The name of a library holds the digest of its content: a path that was loaded is never another library later.
+The name of a library holds the digest of its content: a path that was loaded is never another library later. Every JSON file bears
+a seal, the digest of what it says and of its place: what was damaged, swapped with another entry or written by another user is not there.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import json
 import os
 import re
 import shutil
+import stat
 import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,6 +32,8 @@ from lie_codegen.runtime.compiler import compile_seconds
 
 #: The form of every key.
 DIGEST = re.compile(r"[0-9a-f]{64}")
+#: Characters before what a sealed file says.
+_HEAD = len('{"seal": "", "data": ') + 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +186,7 @@ def scratch(folder: Path) -> Iterator[Path]:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write atomically: a reader sees the old file or the new one.
+    """Write under a seal, atomically: a reader sees the old file or the new one.
 
     Raises:
         OSError: it cannot be written; the old file is untouched.
@@ -190,10 +194,11 @@ def write_json(path: Path, data: Any) -> None:
     path.parent.mkdir(mode=0o700, exist_ok=True)
     import tempfile
 
+    text = json.dumps(data)
     descriptor, name = tempfile.mkstemp(prefix=".new-", dir=path.parent)
     try:
         with open(descriptor, "w", encoding="utf-8") as file:
-            json.dump(data, file)
+            file.write(f"{_head(path, text)}{text}}}")
         os.replace(name, path)
     except OSError:
         unlink(Path(name))
@@ -201,11 +206,22 @@ def write_json(path: Path, data: Any) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """What a JSON file holds; None where it cannot be read."""
+    """What `write_json` wrote at that place; None where it cannot be read, is damaged, was moved there, or is another user's."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        status = path.lstat()  # a FIFO would never answer, and what another user left may be anything
+        if not stat.S_ISREG(status.st_mode) or (hasattr(os, "getuid") and status.st_uid != os.getuid()):
+            return None
+        content = path.read_text(encoding="utf-8")
+        text = content[_HEAD : len(content) - 1]
+        return json.loads(text) if content == f"{_head(path, text)}{text}}}" else None
     except (OSError, ValueError):
         return None
+
+
+def _head(path: Path, text: str) -> str:
+    """The seal of a text at a place, as the file begins: the file as a whole is JSON too."""
+    place = f"{path.parent.name}/{path.name}\0{text}"
+    return f'{{"seal": "{hashlib.sha256(place.encode("utf-8", "surrogatepass")).hexdigest()}", "data": '
 
 
 def _file_digest(path: Path) -> str:

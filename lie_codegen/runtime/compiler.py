@@ -51,6 +51,18 @@ _STOPPED = (
     "Cannot allocate memory",
     "Resource temporarily",
 )
+#: Where gcc and clang look for headers, libraries and their own parts; what Apple's builds for.
+_CHANGE_IT = (
+    "CPATH",
+    "C_INCLUDE_PATH",
+    "COMPILER_PATH",
+    "GCC_EXEC_PREFIX",
+    "LIBRARY_PATH",
+    "SDKROOT",
+    "MACOSX_DEPLOYMENT_TARGET",
+)
+#: Programs that take a compiler's name and run it.
+_KEEPERS = {"ccache", "sccache", "distcc", "icecc"}
 
 
 @dataclass(frozen=True)
@@ -59,8 +71,8 @@ class Compiler:
 
     Attributes:
         command: program and leading arguments.
-        identity: the command, the program's real path, its size and time of change, the further flags; changes when the
-            compiler is upgraded, and costs no process to find out.
+        identity: the command, the program's real path, its size and time of change, the further flags, the variables that change
+            what it does; changes when the compiler is upgraded, and costs a process only of a script, which is asked for its version.
         further: flags after ours, from $LIE_CODEGEN_CFLAGS.
     """
 
@@ -84,7 +96,7 @@ def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compil
             continue
         extra = command[1:] if command[1:2] != ("-m",) else ()
         real = _zig_program() if command[1:2] == ("-m",) else os.path.realpath(program)
-        identity = _identity((*command, *further), real)
+        identity = _identity((*command, *further), real, variables)
         found.setdefault(" ".join((real, *extra)), Compiler((program, *command[1:]), identity, further))
     return tuple(found.values())
 
@@ -221,12 +233,39 @@ def _zig_program() -> str:
     return os.path.realpath(spec.origin) if spec is not None and spec.origin else "ziglang"
 
 
-def _identity(command: tuple[str, ...], real: str) -> str:
-    try:
+def _identity(command: tuple[str, ...], real: str, variables: Mapping[str, str]) -> str:
+    words = [*command, real, *(f"{name}={variables[name]}" for name in _CHANGE_IT if variables.get(name))]
+    with contextlib.suppress(OSError):
         status = os.stat(real)
+        words += [str(status.st_size), str(status.st_mtime_ns)]
+        if _runs_another(real):
+            words.append(_words_of(command, status.st_size, status.st_mtime_ns))
+    return " ".join(words)
+
+
+def _runs_another(real: str) -> bool:
+    """Whether it is a script, or keeps what another compiler made: it stays what it is while that one is upgraded."""
+    if Path(real).stem in _KEEPERS:
+        return True
+    try:
+        with open(real, "rb") as file:
+            return file.read(2) == b"#!"
     except OSError:
-        return " ".join((*command, real))
-    return " ".join((*command, real, str(status.st_size), str(status.st_mtime_ns)))
+        return False
+
+
+@cache
+def _words_of(command: tuple[str, ...], size: int, changed: int) -> str:
+    """What `command --version` prints; nothing where it does not answer soon. Size and time are of the program, for the memo."""
+    import subprocess
+
+    try:
+        done = subprocess.run(
+            [*command, "--version"], stdin=subprocess.DEVNULL, capture_output=True, timeout=min(compile_seconds(), 5.0)
+        )
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.decode(errors="replace").strip()
 
 
 def _quiet_environment(folder: Path) -> dict[str, str]:

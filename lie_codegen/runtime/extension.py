@@ -124,7 +124,9 @@ def _library(
     folder: Path, texts: Mapping[str, str], numpy: Path, compiler: Compiler, refusals: list[str]
 ) -> Path | None:
     version = (numpy / "version.py").read_text(encoding="utf-8")
-    key = digest([dict(texts), _FLAGS, sys.version, sys.implementation.cache_tag, version, compiler.identity])
+    # The suffix of extension modules names the processor, and debug and free-threaded builds, whose objects are others.
+    python = [sys.version, importlib.machinery.EXTENSION_SUFFIXES[0]]
+    key = digest([dict(texts), _FLAGS, *python, version, compiler.identity])
     entry = cache.find_entry(folder, key)
     if entry is None and (reason := refused_before(folder, key)) is not None:
         refusals.append(reason)

@@ -54,7 +54,7 @@ class LaneLibrary:
         home = self._entry.library.parent
         folder = home.parent.parent
         sources = cache.read_json(home / _SOURCES)
-        if not isinstance(sources, dict) or sources.get("sha256") != digest(sources.get("files")):
+        if not isinstance(sources, dict):
             cache.unlink(home / "entry.json")  # the next process builds the whole entry again
             raise ValueError("the sources of the lanes are gone or damaged")
         compilers = find_compilers()
@@ -102,7 +102,6 @@ def keep_sources(
     """
     data = {
         "files": dict(files),
-        "sha256": digest(dict(files)),
         "main": main,
         "flags": list(flags),
         "compiler": compiler.identity,

@@ -277,10 +277,10 @@ def test_what_does_not_match_is_not_used(tmp_path: Path, monkeypatch: pytest.Mon
     assert find_prebuilt(by_name("se2"), folder) is not None
     data = index()
     wrong_bytes = {**data, "sha256": "0" * 64}
-    (folder / "index.json").write_text(json.dumps(wrong_bytes))
+    (folder / "index.json").write_text(json.dumps(prebuilt.sealed(wrong_bytes)))
     assert find_prebuilt(by_name("se2"), folder) is not None  # other bytes, the same functions
-    for wrong in ({**wrong_bytes, "made_from": {"se2": "0" * 64}}, {**data, "files": ["gone.py"]}, {}, []):
-        (folder / "index.json").write_text(json.dumps(wrong))
+    for wrong in ({**wrong_bytes, "made_from": {"se2": "0" * 64}}, {**data, "files": ["gone.py"]}):
+        (folder / "index.json").write_text(json.dumps(prebuilt.sealed(wrong)))
         assert find_prebuilt(by_name("se2"), folder) is None
     (folder / "index.json").unlink()
     assert find_prebuilt(by_name("se2"), folder) is None

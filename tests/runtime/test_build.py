@@ -120,13 +120,26 @@ def entry_files(home: Path) -> tuple[Path, Path]:
         lambda library, entry: library.unlink(),
         lambda library, entry: entry.write_text("{"),
         lambda library, entry: entry.write_text("[]"),
-        lambda library, entry: entry.write_text(json.dumps({**json.loads(entry.read_text()), "signatures": [{}]})),
-        lambda library, entry: entry.write_text(json.dumps({**json.loads(entry.read_text()), "sha256": "0" * 64})),
-        lambda library, entry: entry.write_text(json.dumps({**json.loads(entry.read_text()), "file": "../../x.so"})),
+        lambda library, entry: cache.write_json(entry, {**cache.read_json(entry), "signatures": [{}]}),
+        lambda library, entry: cache.write_json(entry, {**cache.read_json(entry), "sha256": "0" * 64}),
+        lambda library, entry: cache.write_json(entry, {**cache.read_json(entry), "file": "../../x.so"}),
+        lambda library, entry: entry.write_text(entry.read_text().replace('"x"', '"z"')),
         lambda library, entry: entry.unlink(),
         lambda library, entry: shutil.rmtree(entry.parent),
     ],
-    ids=["flipped", "empty", "gone", "json", "list", "signatures", "digest", "outside", "no-entry", "no-folder"],
+    ids=[
+        "flipped",
+        "empty",
+        "gone",
+        "json",
+        "list",
+        "signatures",
+        "digest",
+        "outside",
+        "no-seal",
+        "no-entry",
+        "no-folder",
+    ],
 )
 def test_a_damaged_entry_is_rebuilt_never_loaded(
     damage: Callable[[Path, Path], object], home: Path, tmp_path: Path, compiles: list[str]
@@ -146,6 +159,9 @@ def test_a_damaged_request_is_answered_again(home: Path, compiles: list[str]) ->
     for text in ("", "[]", '{"entry": "../../etc"}', json.dumps({"entry": "0" * 64})):
         request.write_text(text)
         assert build_kernels(lambda: [scaled(2)], definition="two").scale(1.0) == 2.0
+        if text.startswith("{"):
+            cache.write_json(request, json.loads(text))
+            assert build_kernels(lambda: [scaled(2)], definition="two").scale(1.0) == 2.0
     assert len(compiles) == 1
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import os
 import shutil
 import subprocess
@@ -89,8 +88,7 @@ def test_a_refusal_is_kept_for_a_day_and_shown(home: Path, tmp_path: Path, monke
     done = subprocess.run([sys.executable, "-m", "lie_codegen", "cache"], capture_output=True, text=True, check=True)
     assert "the headers are broken" in done.stdout
     (note,) = (home / "python").glob("requests/*.json")
-    data = json.loads(note.read_text())
-    note.write_text(json.dumps({**data, "time": time.time() - 90_000}))
+    cache.write_json(note, {**cache.read_json(note), "time": time.time() - 90_000})
     assert cache_info().degraded == ()
     fake(tmp_path, "")
     _forget()
@@ -236,7 +234,7 @@ def test_old_requests_and_locks_go(home: Path) -> None:
     lock.write_text("")
     for file in (old, lock):
         os.utime(file, (1, 1))
-    orphan.write_text(json.dumps({"entry": "4" * 64}))
+    cache.write_json(orphan, {"entry": "4" * 64})
     evict(home)
     assert old.exists()  # looked after once a day
     (home / "requests" / ".looked-after").unlink()

@@ -19,7 +19,7 @@ from typing import Any
 import lie_codegen as lc
 from lie_codegen.groups.build import object_definition, source_definition
 from lie_codegen.groups.catalogue_names import definition_source
-from lie_codegen.groups.prebuilt import SHARED_STORE, TEMPLATES, file_digest, made_from_digest, prebuilt_folder
+from lie_codegen.groups.prebuilt import SHARED_STORE, TEMPLATES, file_digest, made_from_digest, prebuilt_folder, sealed
 from lie_codegen.runtime.digests import digest, versions
 
 
@@ -76,7 +76,7 @@ def main() -> None:
         "stores": {name: _sha256(folder / f"{name}.json.xz") for name in (*names, SHARED_STORE)},
         "definitions": {digest(definition): name for name in names for definition in definitions_of(name)},
     }
-    (folder / "index.json").write_text(json.dumps(index, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    (folder / "index.json").write_text(json.dumps(sealed(index), indent=1, sort_keys=True) + "\n", encoding="utf-8")
     size = sum(path.stat().st_size for path in folder.iterdir())
     sys.stdout.write(f"{folder}: {len(names)} groups, {size / 1e3:.0f} kB; derived: {', '.join(waiting) or 'none'}\n")
 
