@@ -132,7 +132,7 @@ class VibrationalAverage(Saved):
     def reconstruct(
         self, z: ArrayLike, tau: ArrayLike, eps: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None
     ) -> Array:
-        """The actual state of an averaged one, (15): y = Phi(tau) P(tau) z."""
+        """The actual state of an averaged one at the fast time tau = t / eps, (15): y = Phi(tau) P(tau) z."""
         return self._call("reconstruct", (z, tau, eps), eps, parameters)
 
     def solve(

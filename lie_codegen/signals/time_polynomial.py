@@ -111,8 +111,8 @@ def _parse(expression: sp.Expr, period: sp.Expr) -> TimePolynomial:
     pairs: list[tuple[tuple[int, int], sp.Expr]] = []
     for term in sp.Add.make_args(expression):
         factor, wave = term.as_independent(time_symbol(), as_Add=False)
-        if wave == 1:
-            pairs.append(((0, 0), factor))
+        if not wave.has(time_symbol()):
+            pairs.append(((0, 0), factor * wave))  # SymPy splits 0 into 0 * 0, anything else constant into itself * 1
             continue
         if not isinstance(wave, sp.sin | sp.cos):
             raise InputError(f"{wave} is no sine or cosine")

@@ -172,6 +172,13 @@ def test_mean_moved_to_the_drift():
     assert sp.simplify(shifted.Z[0][1] - plain.Z[0][1] - sp.sin(th) / 2) == 0
 
 
+@pytest.mark.parametrize("still", ["0", "0*cos(t)"])
+def test_inputs_that_vanish_average_to_the_drift(still):
+    system = lagrangian_system(coordinates=("q",), lagrangian="dq^2/2 - cos(q)", forces={"q": "u*sin(q)"})
+    average = vibrational_average(system, PeriodicInput([still], period="2*pi"), order=2)
+    assert sum(average.Z, sp.zeros(2, 1)) == system.drift
+
+
 def test_compiled_kernels_and_symbolic_momentum():
     reduced = routh_reduce(cart(), momentum={"x": "p"})
     average = vibrational_average(reduced, periodic("2*cos(t) + sin(2*t)"), order=2, gauge="zero_mean")

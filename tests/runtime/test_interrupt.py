@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -76,3 +77,16 @@ def test_cutting_changes_nothing() -> None:
             whole[k],
             step.scan_batch(starts[k : k + 1], u[k : k + 1], u[k : k + 1], u[k : k + 1], 1e-2, n=400, every=400)[0],
         )
+
+
+def test_the_process_of_a_solver_is_silent_at_ctrl_c() -> None:
+    """A terminal sends it to every process: the one that waits for work neither ends nor prints where it was."""
+    solver = [sys.executable, "-m", "lie_codegen.steering.transcription.watched_solver"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(solver, **pipes) as process:  # type: ignore[call-overload]
+        assert pickle.load(process.stdout) == "ready"
+        process.send_signal(signal.SIGINT)
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.5)
+        _, said = process.communicate()
+    assert process.returncode == 0 and said == b""

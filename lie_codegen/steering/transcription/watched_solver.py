@@ -145,6 +145,8 @@ def _serve() -> None:
     """Answers requests from standard input until it ends; what solvers print goes to standard error."""
     import casadi as ca
 
+    # Ctrl-C reaches every process of a terminal: the one that asks ends this one, which would only print where it was.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     solvers: dict[str, Any] = {}
