@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -78,6 +79,7 @@ def render_package(
             for path in more
             if "/" not in path and path.endswith(".c")
         ],
+        "declared": [row for path in more if path.startswith("include/") for row in _declared((extra or {})[path])],
     }
     tree = {
         f"include/{namespace}.h": render("header.h.jinja", package=view),
@@ -90,6 +92,12 @@ def render_package(
         **(extra or {}),
     }
     return {**tree, "manifest.json": _manifest(view, kernels, tree, starts or {}, schedule or {})}
+
+
+def _declared(header: str) -> list[tuple[str, str, str]]:
+    """(name, declaration, comment) of the functions of a header, each declared behind its comment."""
+    found = re.findall(r"/\*((?:(?!\*/).)*)\*/\n((?:\w+ )+\**(\w+)\([^;{}]*\));", header, re.DOTALL)
+    return [(name, " ".join(declaration.split()), " ".join(comment.split())) for comment, declaration, name in found]
 
 
 def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:

@@ -57,6 +57,9 @@ def replay(folder: Path, name: str) -> subprocess.CompletedProcess[str]:
 def test_controls_and_path(method: str, tmp_path: Path) -> None:
     plan = plan_of(method)
     folder = lc.generate(plan, tmp_path / "plan")
+    readme = (folder / "README.md").read_text(encoding="utf-8")
+    for own in ("controls", "edge", "piece"):
+        assert f"{plan.group.name}_plan_{own}(" in readme  # listed beside the functions of the group
     name, n = plan.group.name, plan.group.dim
     t = np.sort(np.random.default_rng(0).uniform(0, plan.duration, 500))
     t = t[np.min(np.abs(t[:, None] - np.append(plan.u.breakpoints, -1.0)), axis=1) > 1e-9]
