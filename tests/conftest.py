@@ -20,6 +20,8 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ["LIE_CODEGEN_CACHE"] = config.lie_codegen_cache
         os.environ.setdefault("LIE_CODEGEN_CFLAGS", "-Og")
         os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+        # Where no byte code may be kept, every process that a test starts compiles hundreds of modules anew.
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
