@@ -53,6 +53,7 @@ TARGETS = (
     Target("open_parking", "open_control", "a car parked one metre sideways"),
     Target("open_underwater", "open_control", "an underwater vehicle in a current, which is a parameter"),
     Target("open_qubit", "open_control", "a gate of a detuned qubit by a bounded drive"),
+    Target("transmon_gate", "transmon", "a NOT gate of a transmon: Gauss, DRAG, and least energy without leakage"),
     Target(
         "hessian_errors",
         "hessian_errors",

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, overload
 
+import numpy as np
+
 from lie_codegen.errors import InputError
 from lie_codegen.pictures.result import write_figure
 from lie_codegen.pictures.steering_picture import draw_plan
@@ -56,8 +58,15 @@ def plot_plan(
     """
     target = None if path is None else picture_path(path)
     minimum = plan.cost if plan.method == "optimal" else None
-    same_system = not any(plan.details.get("drift", ())) and "inertia" not in plan.details
-    if compare and minimum is None and same_system:
+    if compare and minimum is None and _driven_alone(plan):
         minimum = steer(plan.group, plan.target, plan.controls, plan.duration, "optimal").cost
     figure = draw_plan(plan, minimum, obstacles)
     return figure if target is None else write_figure(figure, target)
+
+
+def _driven_alone(plan: Plan) -> bool:
+    """Whether basis elements alone move it from the identity, so that `optimal` solves the same task without limits."""
+    system = plan.details.get("system")
+    steady = system is None or (system.steady and not np.any(system.drift.constant))
+    other = any(plan.details.get("drift", ())) or {"inertia", "start"} & set(plan.details)
+    return steady and not other and set(plan.controls) <= set(plan.group.labels)

@@ -11,6 +11,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ChartError
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.pictures.quantum_path import bloch_paths
 from lie_codegen.pictures.steering_loops import COLOURS, GREY
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 from lie_codegen.steering.plan import Plan
@@ -30,7 +31,17 @@ def draw_path(figure: Any, place: Any, plan: Plan, t: Array, X: Array, obstacles
     turned = _rotations(group, X)
     if turned is not None:
         label = "body axis" if not group.is_complex else "Bloch axis"
-        _sphere(figure.add_subplot(place, projection="3d"), turned, label, obstacles)
+        names = [f"{label} {axis}" for axis in (1, 2, 3)]
+        _sphere(figure.add_subplot(place, projection="3d"), turned, names, obstacles)
+        return
+    states = bloch_paths(plan, X) if group.is_complex else None
+    if states is not None:
+        _sphere(
+            figure.add_subplot(place, projection="3d"),
+            *states,
+            obstacles,
+            "Bloch vectors, open to filled dots",
+        )
         return
     _coordinates(figure.add_subplot(place), plan, t, X)
 
@@ -55,13 +66,19 @@ def _rotations(group: MatrixGroup, X: Array) -> Array | None:
     return adjoint if np.allclose(adjoint @ np.swapaxes(adjoint, 1, 2), np.eye(3), atol=1e-6) else None
 
 
-def _sphere(axes: Any, R: Array, name: str, obstacles: Sequence[Obstacle]) -> None:
-    """Where each axis points in space."""
+def _sphere(
+    axes: Any,
+    R: Array,
+    names: Sequence[str],
+    obstacles: Sequence[Obstacle],
+    title: str = "path of the axes in space, from the open to the filled dots",
+) -> None:
+    """Curves (k, 3, j) in the unit ball: where each axis points in space."""
     a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
     axes.computed_zorder = False
     axes.plot_wireframe(np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b), color="0.9", lw=0.5, zorder=0)
-    for axis, colour in zip(range(3), COLOURS, strict=False):
-        axes.plot(*R[:, :, axis].T, color=colour, label=f"{name} {axis + 1}")
+    for axis, (name, colour) in enumerate(zip(names, COLOURS, strict=False)):
+        axes.plot(*R[:, :, axis].T, color=colour, label=name)
         axes.scatter(*R[0, :, axis], color="white", edgecolor=colour, s=18)
         axes.scatter(*R[-1, :, axis], color=colour, s=18)
     seen = np.zeros(3)
@@ -71,7 +88,7 @@ def _sphere(axes: Any, R: Array, name: str, obstacles: Sequence[Obstacle]) -> No
             seen += p[3:6] / np.linalg.norm(p[3:6])
             axes.plot(*(R @ p[:3]).T, color="k", lw=5, alpha=0.15, zorder=1, label="guarded axis")
             axes.plot(*_circle(p[3:6], float(obstacle.half_angle)).T, color="k", ls="--", lw=1.2, label="kept out of")
-    axes.set(title="path of the axes in space, from the open to the filled dots")
+    axes.set(title=title)
     axes.set_axis_off()
     axes.set_box_aspect((1, 1, 1), zoom=1.3)
     elevation, azimuth = _facing(seen)
@@ -135,10 +152,10 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
 
 
 def _coordinates(axes: Any, plan: Plan, t: Array, X: Array) -> None:
-    """Coordinates of the second kind; where their chart ends on the way, what `_entries` draws."""
+    """Coordinates of the second kind; where their chart ends on the way, what `draw_entries` draws."""
     g = _second_kind(plan, t)
     if g is None:
-        _entries(axes, plan.group, t, X)
+        draw_entries(axes, plan.group, t, X)
         return
     for number, label in enumerate(plan.group.labels):
         style = "-" if number < len(COLOURS) else "--"
@@ -158,7 +175,7 @@ def _second_kind(plan: Plan, t: Array) -> Array | None:
         return None
 
 
-def _entries(axes: Any, group: MatrixGroup, t: Array, X: Array) -> None:
+def draw_entries(axes: Any, group: MatrixGroup, t: Array, X: Array) -> None:
     """Of real groups the entries of X that move, of complex ones the weights of the first column."""
     if group.is_complex:
         for row in range(group.degree):

@@ -9,9 +9,10 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.mechanics.driven import simulate_driven
+from lie_codegen.pictures.quantum_path import draw_populations
 from lie_codegen.pictures.result import new_figure
 from lie_codegen.pictures.steering_loops import COLOURS, GREY, draw_loops
-from lie_codegen.pictures.steering_path import draw_path
+from lie_codegen.pictures.steering_path import draw_entries, draw_path
 from lie_codegen.pictures.style import symbol
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan
@@ -32,12 +33,24 @@ def draw_plan(plan: Plan, minimum: float | None = None, obstacles: Sequence[Obst
     figure = new_figure(11, 8.5)
     parts = figure.add_gridspec(2, 2)
     _controls(figure.add_subplot(parts[0, 0]), plan, t)
-    draw_loops(figure.add_subplot(parts[0, 1]), plan, t, velocity)
+    if _has_loops(plan):
+        draw_loops(figure.add_subplot(parts[0, 1]), plan, t, velocity)
+    elif plan.group.is_complex:
+        draw_populations(figure.add_subplot(parts[0, 1]), plan, t, X)
+    else:
+        draw_entries(figure.add_subplot(parts[0, 1]), plan.group, t, X)
     draw_path(figure, parts[1, 0], plan, t, X, obstacles)
     _cost(figure.add_subplot(parts[1, 1]), plan, minimum)
     winner = plan.details.get("winner", plan.method.replace("_", " "))
     figure.suptitle(f"{plan.group.name}: {winner}, endpoint error {plan.error:.1e}", fontsize=12)
     return figure
+
+
+def _has_loops(plan: Plan) -> bool:
+    """Whether loops of the integrated controls tell where it ends: controls of the basis, and no drift that turns all the time."""
+    system = plan.details.get("system")
+    drifts = np.any(plan.details.get("drift", 0.0)) or (system is not None and np.any(system.drift.constant != 0))
+    return set(plan.controls) <= set(plan.group.labels) and not (plan.group.is_complex and drifts)
 
 
 def _motion(plan: Plan, t: Array) -> tuple[Array, Array]:
@@ -49,9 +62,8 @@ def _motion(plan: Plan, t: Array) -> tuple[Array, Array]:
 
 
 def _controls(axes: Any, plan: Plan, t: Array) -> None:
-    u = plan.u(t)
-    for label, colour in zip(plan.controls, COLOURS * 3, strict=False):
-        axes.plot(t, u[:, plan.group.labels.index(label)], color=colour, label=symbol(label))
+    for label, values, colour in zip(plan.controls, plan.inputs(t).T, COLOURS * 3, strict=False):
+        axes.plot(t, values, color=colour, label=symbol(label))
     units = _units(plan)
     rates = "rate [" + ", ".join(f"{unit}/s" for unit in units) + "]" if units else ""
     axes.set(title="controls", xlabel="t [s]", ylabel=rates, xlim=(0, plan.duration))
@@ -60,7 +72,9 @@ def _controls(axes: Any, plan: Plan, t: Array) -> None:
 
 
 def _units(plan: Plan) -> list[str]:
-    """The units of the controls' integrals, each once; none where one has none, or where controls are torques and forces."""
+    """The units of the controls' integrals, each once; none where one has none, or where controls are torques, forces or vectors."""
+    if not set(plan.controls) <= set(plan.group.labels):
+        return []
     units = list(dict.fromkeys(plan.group.units[plan.group.labels.index(label)] for label in plan.controls))
     return [] if "" in units or plan.details.get("inertia") is not None else units
 

@@ -7,23 +7,22 @@ goal does not care about. A plain element T is the goal X = T.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError, SteeringInputError
+from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.steering.end import End, element_end, has_positions
+from lie_codegen.steering.gates import gate_end
 from lie_codegen.values import settle
 
 Numbers = tuple[Any, ...]
-
-#: A gate that is nearer to a unitary one (printed with a few digits) counts as that one.
-_UNITARY = 1e-5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,38 +87,24 @@ class Coset(Saved):
 class UpToPhase(Saved):
     """X = e^(i f) U with any phase f that the group allows: on SU(d) one of d phases, 2 pi / d apart.
 
+    With `levels`, U is the block of X on these levels, a computational space inside a larger one (the two lowest of a transmon):
+    nothing leaks from them to the others at the end, where X may be anything. A plan tells details["fidelity"] of the block and
+    details["leakage"].
+
     Attributes:
-        gate: (d, d) unitary U; its determinant need not be one.
+        gate: (d, d) unitary U, or (s, s) on s levels; its determinant need not be one.
+        levels: s different positions from 0 to d - 1; all if not given.
     """
 
     gate: ArrayLike
+    levels: Sequence[int] | None = None
 
     def __post_init__(self) -> None:
-        settle(self, gate=_plain(self.gate, "UpToPhase: gate"))
+        levels = None if self.levels is None else _plain(self.levels, "UpToPhase: levels")
+        settle(self, gate=_plain(self.gate, "UpToPhase: gate"), levels=levels)
 
 
 GoalSet = Pointing | Position | Coset | UpToPhase
-
-
-@dataclass(frozen=True)
-class End:
-    """A goal as equations: L (exp(before) X exp(after)) R = one of the values.
-
-    Attributes:
-        left, right: L (p, d), R (d, s).
-        values: (variants, p, s).
-        before, after: (k, n) free directions of the algebra on either side.
-        elements: (variants, d, d) where the goal is an element up to the free directions, else None.
-        phases: of the variants, rad, where the goal is a gate up to its phase.
-    """
-
-    left: Array = field(repr=False)
-    right: Array = field(repr=False)
-    values: Array = field(repr=False)
-    before: Array = field(repr=False)
-    after: Array = field(repr=False)
-    elements: Array | None = field(default=None, repr=False)
-    phases: tuple[float, ...] = ()
 
 
 def end_of(group: MatrixGroup, target: Any, where: str) -> End:
@@ -133,15 +118,15 @@ def end_of(group: MatrixGroup, target: Any, where: str) -> End:
     if isinstance(target, Position):
         return _position(group, target, where)
     if isinstance(target, UpToPhase):
-        return _up_to_phase(group, target, where)
+        return gate_end(group, target.gate, target.levels, where)
     none = np.zeros((0, group.dim))
     if isinstance(target, Coset):
         free = _directions(group, target.free, where)
         element = group_element(group, np.array(target.element), where)
-        return _element_end(
+        return element_end(
             group, element[None], none if target.side == "right" else free, free if target.side == "right" else none
         )
-    return _element_end(group, group_element(group, target, where)[None], none, none)
+    return element_end(group, group_element(group, target, where)[None], none, none)
 
 
 def cosets(group: MatrixGroup, target: Any, where: str) -> tuple[Array, Array]:
@@ -185,24 +170,6 @@ def _turn(a: Array, b: Array) -> Array:
     return np.asarray(eye - 2 * np.outer(a, a) - 2 * np.outer(across, across))
 
 
-def _element_end(
-    group: MatrixGroup, elements: Array, before: Array, after: Array, phases: tuple[float, ...] = ()
-) -> End:
-    eye = np.eye(group.degree)
-    scale = np.ones(group.degree)
-    if has_positions(group):
-        # metres and radians: positions count in units of the largest distance in sight
-        far = float(np.max(np.linalg.norm(elements[:, :-1, -1], axis=1)))
-        scale[-1] = 1 / far if far > 1e-3 else 1.0
-    right = eye * scale
-    return End(eye, right, elements @ right, before, after, elements, phases)
-
-
-def has_positions(group: MatrixGroup) -> bool:
-    """Whether the last row of every X is (0, ..., 0, 1), so that the last column is a position."""
-    return not group.is_complex and not np.any(group.basis[:, -1]) and bool(np.any(group.basis[:, :-1, -1]))
-
-
 def _pointing(group: MatrixGroup, goal: Pointing, where: str) -> End:
     axis, direction = np.array(goal.axis, dtype=float), np.array(goal.direction, dtype=float)
     if (
@@ -241,7 +208,7 @@ def _bloch(group: MatrixGroup, axis: Array, direction: Array) -> End:
     unit = turn / size if size > 0 else turn
     element = np.cos(angle / 2) * np.eye(2) - 1j * np.sin(angle / 2) * np.tensordot(unit, pauli, 1)
     about = group.project(-0.5j * np.tensordot(axis, pauli, 1))
-    return _element_end(group, element[None], np.zeros((0, 3)), about[None])
+    return element_end(group, element[None], np.zeros((0, 3)), about[None])
 
 
 def _position(group: MatrixGroup, goal: Position, where: str) -> End:
@@ -256,45 +223,6 @@ def _position(group: MatrixGroup, goal: Position, where: str) -> End:
     scale = 1 / far if far > 1e-3 else 1.0
     none = np.zeros((0, group.dim))
     return End(scale * np.eye(d)[:-1], np.eye(d)[:, -1:], scale * point[None, :, None], none, none)
-
-
-def _up_to_phase(group: MatrixGroup, goal: UpToPhase, where: str) -> End:
-    gate = np.array(goal.gate, dtype=complex)
-    d, none = group.degree, np.zeros((0, group.dim))
-    if not group.is_complex:
-        raise SteeringInputError(
-            f"{where}: UpToPhase needs a group of complex matrices (su2, su4 ...), not {group.name}"
-        )
-    if gate.shape != (d, d):
-        raise ShapeError(f"{where}: UpToPhase holds a matrix of shape {gate.shape}; give ({d}, {d})")
-    # the nearest unitary matrix is the unitary factor of the polar form
-    left, sizes, right = np.linalg.svd(gate)
-    off = float(np.max(np.abs(sizes - 1)))
-    if off > _UNITARY:
-        raise NotOnGroupError(
-            f"{where}: UpToPhase needs a unitary matrix; the singular values of the one given differ from 1 by {off:.2g}"
-        )
-    gate = left @ right
-    whole = group.project(1j * np.eye(d))
-    if np.allclose(group.hat(whole), 1j * np.eye(d), atol=1e-12):
-        return _element_end(group, gate[None], none, whole[None])
-    phases = (-np.angle(np.linalg.det(gate)) + 2 * np.pi * np.arange(d)) / d
-    elements = np.exp(1j * phases)[:, None, None] * gate
-    if group.dim < d * d - 1:
-        fits = [_fits(group, element, where) for element in elements]
-        if not any(fits):
-            raise NotOnGroupError(f"{where}: no phase takes the gate into the group {group.name}")
-        phases, elements = phases[fits], elements[fits]
-    turns = tuple(float(phase) for phase in np.mod(phases, 2 * np.pi))
-    return _element_end(group, elements, none, none, turns)
-
-
-def _fits(group: MatrixGroup, element: Array, where: str) -> bool:
-    try:
-        group_element(group, element, where)
-    except NotOnGroupError:
-        return False
-    return True
 
 
 def _directions(group: MatrixGroup, free: Sequence[Any], where: str) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,32 +13,58 @@ from lie_codegen.steering.plan import Plan
 
 
 def qutip_evolution(plan: Plan) -> tuple[Any, Array]:
-    """(qutip.QobjEvo of H(t), times) with U' = -i H(t) U from plan.details["system"].start to the target.
+    """(qutip.QobjEvo of H(t), times) with U' = -i H(t) U: from the start to the target, or, of a left-invariant plan, from the identity to
+    start^-1 target.
 
     H = i (drift + sum_i u_i b_i) as matrices. A plan of the left-invariant equation is played backwards in time, which is what makes it
-    a solution of Schroedinger's. Constant pieces become step functions; controls that are linear between nodes stay linear.
+    a solution of Schroedinger's. Constant pieces become step functions and controls that are linear between nodes stay linear; smooth
+    controls of other methods, and directions that depend on time, become functions of t.
 
     Raises:
-        SteeringInputError: a plan of another method or of a group of real matrices, or directions that depend on time.
+        SteeringInputError: a plan on a group of real matrices, or of torques.
         MissingDependencyError: qutip is not installed.
     """
-    system, inputs = plan.details.get("system"), plan.details.get("inputs")
-    if system is None or inputs is None or not plan.group.is_complex:
-        raise SteeringInputError("qutip_evolution: give a plan of method='direct' on a group of unitary matrices")
-    if not system.steady:
-        raise SteeringInputError(
-            "qutip_evolution: controls and drift must not depend on time; sample plan.u(t) instead"
-        )
+    if not plan.group.is_complex or plan.details.get("inertia") is not None:
+        raise SteeringInputError("qutip_evolution: give a plan of velocities on a group of unitary matrices")
     try:
         from qutip import Qobj, QobjEvo
     except ImportError:
         raise MissingDependencyError("qutip_evolution needs qutip: pip install qutip") from None
+    hat = plan.group.hat
+    system, inputs = plan.details.get("system"), plan.details.get("inputs")
+    if system is None or inputs is None or not system.steady:
+        parts = [[Qobj(1j * A), _Component(plan, number)] for number, A in enumerate(plan.group.basis)]
+        return QobjEvo(parts), np.unique(np.concatenate([np.linspace(0, plan.duration, 101), _breakpoints(plan)]))
     played = inputs if system.right else inputs.reversed()
     stepwise = bool(np.all(played.first == played.last))
     values = np.vstack([played.first, played.last[-1:]])
-    hat = plan.group.hat
-    parts: list[Any] = [Qobj(1j * hat(system.drift.constant))]
+    terms: list[Any] = [Qobj(1j * hat(system.drift.constant))]
     for number, direction in enumerate(system.directions):
         coefficients = values[:, number].astype(complex)
-        parts.append([Qobj(1j * hat(direction.constant)), coefficients])
-    return QobjEvo(parts, tlist=played.knots, order=0 if stepwise else 1), np.asarray(played.knots)
+        terms.append([Qobj(1j * hat(direction.constant)), coefficients])
+    return QobjEvo(terms, tlist=played.knots, order=0 if stepwise else 1), np.asarray(played.knots)
+
+
+@dataclass(frozen=True)
+class _Component:
+    """t -> one component of the velocity, drift included, as it is played."""
+
+    plan: Plan
+    number: int
+
+    def __call__(self, t: float) -> float:
+        s = min(max(t if _forwards(self.plan) else self.plan.duration - t, 0.0), self.plan.duration)
+        system = self.plan.details.get("system")
+        drift = self.plan.details.get("drift", np.zeros(self.plan.group.dim))
+        if system is not None:
+            drift = system.drift.at(np.array([s]))[0]
+        return float(self.plan.u(s)[self.number] + drift[self.number])
+
+
+def _forwards(plan: Plan) -> bool:
+    return bool(getattr(plan.details.get("system"), "right", False))
+
+
+def _breakpoints(plan: Plan) -> Array:
+    """Where controls may jump, in the time in which they are played."""
+    return plan.u.breakpoints if _forwards(plan) else plan.duration - plan.u.breakpoints

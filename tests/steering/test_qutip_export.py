@@ -23,6 +23,26 @@ def test_qutip_solves_the_plan_to_its_gate(equation: str, polish: bool) -> None:
     assert abs(np.trace(U.conj().T @ HADAMARD)) / 2 == pytest.approx(1, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("controls", "options"),
+    [
+        (("sx", "sy"), {"method": "optimal"}),
+        (("sx", "sy"), {"method": "swing_twist"}),
+        (
+            (lambda t: (np.cos(t), np.sin(t), 0), "sy"),
+            {"drift": (0, 0, "1 + t/10"), "bounds": 3, "equation": "right", "method": "direct"},
+        ),
+    ],
+)
+def test_qutip_solves_plans_of_any_method(controls: tuple[object, ...], options: dict[str, object]) -> None:
+    qutip = pytest.importorskip("qutip")
+    plan = lc.steer("su2", 1j * HADAMARD, controls, 6.0, **options)
+    H, times = lc.qutip_evolution(plan)
+    options = {"atol": 1e-10, "rtol": 1e-9, "nsteps": 100_000, "max_step": 0.02}
+    U = qutip.sesolve(H, qutip.qeye(2), times, options=options).states[-1].full()
+    np.testing.assert_allclose(U, 1j * HADAMARD, atol=1e-6)
+
+
 def test_plans_of_rotations_are_refused() -> None:
     plan = lc.steer(lc.group("so3"), (0.1, 0.2, 0.3), ("w1", "w2"), 1.0, method="direct")
     with pytest.raises(lc.errors.SteeringInputError, match="unitary"):

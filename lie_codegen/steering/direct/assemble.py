@@ -16,7 +16,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.programme import Goal, Programme
 from lie_codegen.steering.direct.system import System
-from lie_codegen.steering.goals import End
+from lie_codegen.steering.end import End
 
 _EARLY, _LATE = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
 _GAUSS = 0.5 + np.array([-1, 1]) * math.sqrt(3) / 6

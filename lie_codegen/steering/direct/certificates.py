@@ -16,7 +16,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.direct.assemble import Manoeuvre
-from lie_codegen.steering.goals import has_positions
+from lie_codegen.steering.end import has_positions
 
 _MOST_CONTROLS = 10
 #: Relative margin, so that rounding proves nothing.

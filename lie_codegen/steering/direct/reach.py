@@ -12,7 +12,7 @@ from lie_codegen.errors import UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.accessibility import closure, independent
 from lie_codegen.steering.direct.system import System
-from lie_codegen.steering.goals import End
+from lie_codegen.steering.end import End
 
 _SAMPLES = 7
 

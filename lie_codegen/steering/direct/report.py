@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,8 @@ def plan_of(
         "fidelity": fidelity(task, found.X, variant),
         **details,
     }
+    if task.end.levels:
+        told["leakage"] = leakage(found.X, task.end.levels)
     if not system.right and system.drift.constant is not None and np.any(system.drift.constant):
         told["drift"] = system.drift.constant
     if np.any(system.start != np.eye(group.degree)):
@@ -83,11 +86,19 @@ def error_at(task: Manoeuvre, found: Flown, variant: int) -> float:
 
 
 def fidelity(task: Manoeuvre, X: Array, variant: int) -> float | None:
-    """|tr(U^H X)|^2 / d^2 of unitary groups, None on others: one for the gate up to its phase."""
-    elements, d = task.end.elements, task.system.group.degree
+    """|tr(U^H X)|^2 / d^2 of unitary groups, None on others: one for the gate up to its phase; of a gate on s levels |tr(U^H X_s)|^2 / s^2
+    with the block X_s of these levels."""
+    elements = task.end.elements
     if elements is None or not task.system.group.is_complex:
         return None
-    return float(np.abs(np.vdot(elements[variant], X)) ** 2 / d**2)
+    levels = task.end.levels or range(task.system.group.degree)
+    block = np.ix_(levels, levels)
+    return float(np.abs(np.vdot(elements[variant][block], X[block])) ** 2 / len(levels) ** 2)
+
+
+def leakage(X: Array, levels: Sequence[int]) -> float:
+    """1 - tr(X_s^H X_s) / s: what leaves the levels, the mean over states that begin in them."""
+    return max(0.0, float(1 - np.sum(np.abs(X[np.ix_(levels, levels)]) ** 2) / len(levels)))
 
 
 def cost_of(task: Manoeuvre, inputs: Inputs, objective: str) -> float:

@@ -151,7 +151,10 @@ def _cheapest_phase(
     """
     elements, free = cosets(group, target, f"steer({group.name}): target")
     if len(free):
-        raise SteeringInputError(f"steer({group.name}): every phase is in the group; give the gate with one of them")
+        raise SteeringInputError(
+            f"steer({group.name}): with costs or constraints of one's own the gate must be up to one of finitely many phases: give it "
+            'with its phase, on all levels; method="direct" takes any'
+        )
     plans: list[Plan] = []
     failed: list[SteeringError] = []
     for element in elements:
