@@ -88,10 +88,9 @@ def _block_end(group: MatrixGroup, gate: Array, levels: tuple[int, ...], where: 
     inside = np.ix_(levels, levels)
     others = [level for level in range(d) if level not in levels]
     away = np.array(group.basis)
-    away[(slice(None), *inside)] -= np.trace(away[(slice(None), *inside)], axis1=1, axis2=2)[:, None, None] * (
-        np.eye(len(levels)) / len(levels)
-    )
-    away[(slice(None), *np.ix_(others, others))] = 0
+    for A in away:
+        A[inside] -= np.trace(A[inside]) / len(levels) * np.eye(len(levels))
+        A[np.ix_(others, others)] = 0
     rows = away.reshape(group.dim, -1)
     _, sizes, directions = np.linalg.svd(np.hstack([rows.real, rows.imag]).T, full_matrices=True)
     free = directions[int(np.sum(sizes > 1e-10 * max(1.0, float(sizes[0])))) :]

@@ -67,4 +67,5 @@ def _forwards(plan: Plan) -> bool:
 
 def _breakpoints(plan: Plan) -> Array:
     """Where controls may jump, in the time in which they are played."""
-    return plan.u.breakpoints if _forwards(plan) else plan.duration - plan.u.breakpoints
+    knots = np.asarray(plan.u.breakpoints)
+    return knots if _forwards(plan) else np.asarray(plan.duration - knots)
