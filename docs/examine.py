@@ -12,7 +12,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-#: What people type, and a page that has to be among the first twenty.
+#: What people type, and a page that has to be among the first three.
 SEARCHES = {
     "two wheels": "tutorials/satellite",
     "CNOT": "tutorials/qubit",
@@ -23,7 +23,7 @@ SEARCHES = {
     "Kapitza": "tutorials/vibration",
     "not controllable": "howto/steering/no",
 }
-_FIRST = 20
+_FIRST = 3
 
 
 class _Quiet(SimpleHTTPRequestHandler):

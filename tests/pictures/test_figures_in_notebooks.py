@@ -23,7 +23,8 @@ def test_figures_are_shown_by_a_notebook_and_written_as_before(tmp_path: Path) -
     figures = {"plan": lc.plot_plan(plan, compare=False), "loops": lc.plot_loops(run)}
     for name, figure in figures.items():
         shown = pickle.loads(pickle.dumps(figure))._repr_png_()
-        assert shown.startswith(b"\x89PNG") and len(shown) > 5000, name
+        assert shown.startswith(b"\x89PNG"), name
+        assert len(shown) > 5000, name
     written = lc.plot_loops(run, tmp_path / "new" / "loops.PNG")
     assert written.read_bytes().startswith(b"\x89PNG")
 

@@ -89,4 +89,5 @@ def test_the_process_of_a_solver_is_silent_at_ctrl_c() -> None:
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.5)
         _, said = process.communicate()
-    assert process.returncode == 0 and said == b""
+    assert process.returncode == 0
+    assert said == b""
