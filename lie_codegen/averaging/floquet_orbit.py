@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, Protocol, runtime_checkable
 
@@ -76,8 +76,16 @@ class AveragedFlow(Protocol):
         """(x, eps[, order]) -> x'."""
 
 
+@runtime_checkable
+class AveragedMotion(Protocol):
+    """An average over a free motion, whose slow variables are told by that motion: of lc.tumbling_average."""
+
+    def slow_flow(self, X: ArrayLike, omega: ArrayLike) -> tuple[Kernel, Array, Array]:
+        """The field of the slow variables, their values on the motion through (X, omega), and their units."""
+
+
 def floquet(
-    rates: Sequence[Any] | Kernel | VibrationalAverage | AveragedFlow | ClosedLoop,
+    rates: Sequence[Any] | Kernel | VibrationalAverage | AveragedFlow | AveragedMotion | ClosedLoop,
     variables: Sequence[str] | None = None,
     guess: ArrayLike | None = None,
     *,
@@ -96,7 +104,8 @@ def floquet(
             none, and whose first output is y' (`parameters` then gives its other inputs); or a vibrational average, whose
             actual system it then is, the true loop (`parameters` gives eps; its period is known); or an average of
             lc.phase_average, lc.time_average or lc.euler_average, whose slow flow it then is, differentiated exactly
-            (`parameters` gives eps, and order 1 or 2 where there is a phase); or a run of lc.closed_loop
+            (`parameters` gives eps, and order 1 or 2 where there is a phase); or one of lc.tumbling_average, whose guess is
+            (X, omega) and whose slow variables are (H, D); or a run of lc.closed_loop
             on a matrix group, whose last state is the guess: then X' = X hat(xi), and a `LoopOrbit` is returned.
         variables: (n,) names.
         guess: (n,) a point near the orbit; of several orbits the answer is the one that belongs to the guess.
@@ -125,20 +134,44 @@ def floquet(
         kernels = kernel_orbit_kernels(actual, dict(parameters or {}), "tau", 1 / eps)
         period = eps * float(rates.fields.period) if period is None else period
         driven = True
+    elif isinstance(rates, AveragedMotion):
+        return _orbit_of_motion(rates, guess, period, transient, return_to)
     else:
         kernels = _read(rates, variables, parameters)
         driven = _is_driven(rates, kernels)
     n = kernels[0].inputs[0].size
-    start = _start(guess, n)
-    system = _system(kernels)
     section = None if return_to is None else _start(return_to, n)
-    start, length, residual, monodromy = found_orbit(system, start, period, driven, section, transient)
+    return _orbit(kernels, _start(guess, n), period, driven, section, transient)
+
+
+def _orbit(
+    kernels: tuple[Kernel, ...], guess: Array, period: Any, driven: bool, section: Array | None, transient: bool
+) -> Orbit:
+    system = _system(kernels)
+    start, length, residual, monodromy = found_orbit(system, guess, period, driven, section, transient)
     moments = np.arange(256) / 256 * length
     jacobians = np.asarray(system.library.jacobian.batch(system.motion(start, length).at(moments), moments))
     mean = jacobians.mean(axis=0)
     volume = np.exp(length * float(np.trace(mean)))
     liouville = abs(float(np.linalg.det(monodromy)) - volume) / volume
     return Orbit(start, length, eigenvalues(monodromy), monodromy, not driven, residual, liouville, mean, kernels)
+
+
+def _orbit_of_motion(average: AveragedMotion, guess: Any, period: Any, transient: bool, return_to: Any) -> Orbit:
+    """The orbit in units of the slow variables, in which all are of size 1, told in their own."""
+    if not isinstance(guess, list | tuple) or len(guess) != 2:
+        raise InputError("floquet: the guess of an average over a free motion is (X, omega)")
+    kernel, start, scale = average.slow_flow(*guess)
+    section = None if return_to is None else _start(return_to, len(start)) * scale
+    driven = len(kernel.inputs) > 1
+    found = _orbit(
+        kernel_orbit_kernels(kernel, {}, scale=scale.tolist()), start / scale, period, driven, section, transient
+    )
+    ratio = scale[:, None] / scale
+    return replace(
+        found, start=found.start * scale, monodromy=found.monodromy * ratio, mean_jacobian=found.mean_jacobian * ratio,
+        kernels=kernel_orbit_kernels(kernel, {}),
+    )  # fmt: skip
 
 
 def _read(rates: Any, variables: Any, parameters: Any) -> tuple[Kernel, ...]:

@@ -33,7 +33,12 @@ def formula_orbit_kernels(
 
 @kernel_factory()
 def kernel_orbit_kernels(
-    kernel: Kernel, inputs: Mapping[str, Any] | None = None, time: str = "t", clock: Any = 1, namespace: str = NAMESPACE
+    kernel: Kernel,
+    inputs: Mapping[str, Any] | None = None,
+    time: str = "t",
+    clock: Any = 1,
+    scale: Sequence[Any] | None = None,
+    namespace: str = NAMESPACE,
 ) -> tuple[Kernel, ...]:
     """The same of a kernel whose first input is y, with an input for the time or none, and whose first output is y'.
 
@@ -42,6 +47,7 @@ def kernel_orbit_kernels(
         inputs: numbers for its other inputs, by name.
         time: name of its input of time, which is clock * t.
         clock: a number.
+        scale: units of y, one an entry; the kernels then are of y in these units.
         namespace: of the C symbols.
     """
     state, *rest = kernel.inputs
@@ -55,7 +61,11 @@ def kernel_orbit_kernels(
     def field(ops: Arithmetic, y: Sequence[Scalar], others: Sequence[Scalar]) -> list[Scalar]:
         now = others[0] * ops.constant(_number(clock))
         values = [now if port.name == time else _constant(ops, given[port.name]) for port in rest]
-        return list(kernel.evaluate(ops, list(y), *values)[0])
+        if scale is None:
+            return list(kernel.evaluate(ops, list(y), *values)[0])
+        units = [ops.constant(_number(each)) for each in scale]
+        found = kernel.evaluate(ops, [a * unit for a, unit in zip(y, units, strict=True)], *values)[0]
+        return [a / unit for a, unit in zip(found, units, strict=True)]
 
     return _kernels(field, state.size, namespace)
 

@@ -133,6 +133,7 @@ def _piece(
     return TumblingRun(
         kept, H, energy, square / (2 * energy), modulus(axes, found), phi, alpha, full_H, full_energy,
         (axes.mode,) * len(kept), status, event, resonances, tuple(dropped), ratio, motion.evaluations,
+        model.state_at(axes, found[-1], float(kept[-1])),
     )  # fmt: skip
 
 
@@ -143,5 +144,5 @@ def _joined(a: TumblingRun, b: TumblingRun) -> TumblingRun:
     left = "" if a.event is None else f"; continued beyond the separatrix at t = {a.event.t:.6g}"
     return replace(
         a, **columns, mode=(*a.mode, *b.mode[1:]), status=b.status + left, event=b.event if b.event is not None else a.event,
-        resonances=a.resonances + b.resonances, evaluations=a.evaluations + b.evaluations,
+        resonances=a.resonances + b.resonances, evaluations=a.evaluations + b.evaluations, end=b.end,
     )  # fmt: skip

@@ -45,6 +45,15 @@ class Torque(Saved):
         return callable(self.direction)
 
     @property
+    def is_driven(self) -> bool:
+        """Whether the torque depends on time."""
+        kernel = self.numbers.get("kernel")
+        if kernel is not None:
+            return any(port.name == "t" for port in kernel.inputs)
+        read = self.numbers["formulas"] if self.kind == "formula" else self.direction
+        return self.is_function or any(symbol.name == "t" for each in read for symbol in each.free_symbols)
+
+    @property
     def unit(self) -> bool:
         """Whether only the direction counts, the size being in the pressure."""
         return self.plates is not None

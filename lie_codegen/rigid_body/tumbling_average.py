@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.rigid_body.direct_motion import direct_motion
 from lie_codegen.rigid_body.free_rotation import FreeRotation, rotation_about
 from lie_codegen.rigid_body.inertia_matrix import principal_axes
 from lie_codegen.rigid_body.mean_motion import Wishes, mean_motion
 from lie_codegen.rigid_body.torques import Torque
-from lie_codegen.rigid_body.tumbling_body import TumblingBody, each_motion
+from lie_codegen.rigid_body.tumbling_body import BodyAxes, TumblingBody, each_motion
+from lie_codegen.rigid_body.tumbling_slow import TumblingEquilibrium, equilibrium_of, slow_kernels
 
 #: Phases of a single rate where plates have kinks.
 _PLATES_ONCE = 128
@@ -111,6 +113,41 @@ class TumblingAverage(TumblingBody):
         times = _times(t)
         runs = [direct_motion(self, each, times, steps_per_turn) for each in each_motion(free)]
         return runs[0] if not free.fixed.shape else runs
+
+    def slow_flow(self, X: ArrayLike, omega: ArrayLike) -> tuple[Kernel, Array, Array]:
+        """The averaged flow of the motions about the axis that (X, omega) circles: ((H, D)[, t]) -> (H', D'), (H, D) there, their units.
+
+        For `lc.floquet(model, guess=(X, omega))`; the averages' loops are differentiated exactly.
+
+        Raises:
+            InputError: a batch, a motion without a torus, or a direction that is a Python function.
+        """
+        kernel, start, scale, _ = self._slow(X, omega)
+        return kernel, start, scale
+
+    def equilibrium(self, X: ArrayLike, omega: ArrayLike, t: float = 0.0) -> TumblingEquilibrium:
+        """The equilibrium of the averaged flow near the motion through (X, omega), directions held at t, with its eigenvalues.
+
+        Raises:
+            InputError: as `slow_flow`.
+            ComputationError: Newton's method ends at none.
+        """
+        kernel, start, scale, axes = self._slow(X, omega)
+        return equilibrium_of(kernel, start, scale, axes.inertia, axes.mode, float(t))
+
+    def _slow(self, X: ArrayLike, omega: ArrayLike) -> tuple[Kernel, Array, Array, BodyAxes]:
+        free = self.torus(X, omega)
+        if free.fixed.shape:
+            raise InputError("tumbling_average: the slow flow belongs to one motion; give X (3, 3) and omega (3,)")
+        if self.functions:
+            raise InputError(
+                f"tumbling_average: the direction of torque.{self.functions[0].kind} is a Python function, which has no derivative; "
+                "give it as formulas in t"
+            )
+        axes, y = self.start(free)
+        kernel = slow_kernels(self.J, self.torques, axes.paper, axes.inertia, float(free.k))[0]
+        L = float(np.linalg.norm(y[:3]))
+        return kernel, y[:4], np.array([L, L, L, L * L]), axes
 
 
 def tumbling_average(J: Any, torques: Sequence[Torque]) -> TumblingAverage:

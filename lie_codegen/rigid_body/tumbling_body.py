@@ -119,6 +119,15 @@ class TumblingBody(Saved):
         y[4:] = motion["phi"], motion["alpha"]
         return axes, y
 
+    def state_at(self, axes: BodyAxes, y: Array, t: float) -> tuple[Array, Array]:
+        """(X, omega) of the free motion through (H, D, phi, alpha hat)."""
+        _, _, _, b = self.library["shape"](y[:3], float(y[3]), axes.inertia)
+        alpha = float(y[5] + np.sin(4 * np.pi * y[4] * np.arange(1, len(b) + 1)) @ b)
+        found = self.library["torque_at"](
+            y[:3], float(y[3]), float(y[4]), alpha, t, axes.paper, axes.inertia, *self.given(t)
+        )
+        return np.asarray(found[2]), np.asarray(found[3])
+
     def periodic(self, axes: BodyAxes, y: Array, t: float) -> tuple[Array, float]:
         """W (4,) with osculating (H, D) = mean + W, and the largest |N| on the torus."""
         W, largest = self.library["periodic"](y, float(t), axes.paper, axes.inertia, *self.given(t))

@@ -15,15 +15,9 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import call_routine
 from lie_codegen.rigid_body.rotation_formulas import about_third, apply, cross, multiply, transpose
 from lie_codegen.rigid_body.rotation_kernels import TERMS, precession_routine
+from lie_codegen.rigid_body.torque_model import BODY, TorqueModel, motion_of, point_of
 from lie_codegen.rigid_body.torques import Torque
-from lie_codegen.rigid_body.tumbling_routines import (
-    BODY,
-    TorqueModel,
-    average_routine,
-    motion_of,
-    point_of,
-    torus_routine,
-)
+from lie_codegen.rigid_body.tumbling_routines import average_routine, torus_routine
 
 NAMESPACE = "tumbling"
 #: k of the separatrix event.

@@ -63,6 +63,8 @@ class TumblingRun(Saved):
         dropped: (n1, n2) left out of the map at the start for small divisors.
         torque_ratio: largest |N| Tn / |H| at the start.
         evaluations: of the averaged rates.
+        end: (X, omega) of a motion with the mean H and energy of the last time, from which `start="osculating"`, `rate`, `equilibrium` and
+            `lc.floquet` go on; its phases are to first order, or arbitrary without osculating=True.
     """
 
     t: Array
@@ -81,6 +83,7 @@ class TumblingRun(Saved):
     dropped: tuple[tuple[int, int], ...]
     torque_ratio: float
     evaluations: int
+    end: tuple[Array, Array] = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
