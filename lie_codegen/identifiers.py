@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 from lie_codegen.errors import IdentifierError
 
@@ -26,6 +25,8 @@ KEYWORDS = frozenset(
 
 def unknown_keywords(where: str, unknown: Iterable[str], known: Iterable[str]) -> str:
     """What to say of keywords that a function does not have: the nearest that it has, or all."""
+    from difflib import get_close_matches
+
     names = sorted(known)
     said = []
     for word in unknown:

@@ -9,7 +9,7 @@ from lie_codegen.averaging.shape_form import ShapeForm
 from lie_codegen.errors import InputError
 from lie_codegen.groups.maps.matrices import matrix_port, random_element
 from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
-from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.brackets import bracket

@@ -18,7 +18,8 @@ from lie_codegen.control.closed_loop import closed_loop
 from lie_codegen.control.loop_kernels import loop_step
 from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.kernel.kernel import Kernel
-from lie_codegen.studies.distributions import Distribution, Normal, OnGroup, Uniform
+from lie_codegen.studies.distributions import Distribution, Normal, Uniform
+from lie_codegen.studies.on_group import OnGroup
 from lie_codegen.studies.space import Space
 from lie_codegen.studies.study import study
 

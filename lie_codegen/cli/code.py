@@ -36,8 +36,8 @@ def generate(
     json: Json = False,
 ) -> None:
     """Generate the C package of a group, of its laws and plans: header, source, CMake, example, test vectors."""
-    from lie_codegen.groups.build import generate as write
     from lie_codegen.groups.catalogue_load import group as load
+    from lie_codegen.groups.generate import generate as write
 
     started = time.perf_counter()
     g = load(group)

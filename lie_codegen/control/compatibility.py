@@ -21,7 +21,7 @@ from lie_codegen.errors import ExpressionError, IncompatibleError, InputError
 from lie_codegen.exact.exponential import MatrixExponential
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic
 from lie_codegen.kernel.dual import (

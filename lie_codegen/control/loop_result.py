@@ -14,7 +14,6 @@ from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.control.loop_adaptive import states_within
 from lie_codegen.control.loop_error import loop_error
 from lie_codegen.control.loop_origin import LoopMaking, LoopOrigin
-from lie_codegen.control.loop_package import loop_parts
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import EventHits
 from lie_codegen.kernel.saved import Saved
@@ -93,6 +92,8 @@ class ClosedLoop(Saved):
         Raises:
             InputError: the loop has no law; or it is from a file, and its law was written by hand and has no definition.
         """
+        from lie_codegen.control.loop_package import loop_parts
+
         made = making_of(self, "generate")
         run, parts = made.in_steps()
         return loop_parts(run, made.reference, parts, name, real)

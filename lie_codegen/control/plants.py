@@ -28,7 +28,7 @@ from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import plain, record_factory

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.control.curve_reference import CurveReference, curve_reference
 from lie_codegen.control.manifold import Manifold
-from lie_codegen.control.plan_reference import Planned, plan_reference
 from lie_codegen.control.reference_motion import (
     FormulaReference,
     PlanReference,
@@ -18,15 +17,13 @@ from lie_codegen.control.reference_motion import (
     WaypointReference,
     formula_reference,
 )
-from lie_codegen.control.retimed_plan import retimed
-from lie_codegen.control.waypoints import sampled_reference, waypoint_reference
 from lie_codegen.errors import InputError
 from lie_codegen.exact.expression import time_symbol
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
-from lie_codegen.groups.wei_norman.body import WeiNormanData, body_velocity, product_exp
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import double, doubles, kernel_factory, record_factory
@@ -34,6 +31,9 @@ from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec
+
+if TYPE_CHECKING:
+    from lie_codegen.control.plan_reference import Planned
 
 
 @kernel_factory()
@@ -77,6 +77,8 @@ class ReferenceBody:
         return self._waypoints(ops, t, self.reference)
 
     def _formulas(self, ops: Arithmetic, t: Scalar, reference: FormulaReference) -> tuple[Any, Vector, Vector]:
+        from lie_codegen.groups.wei_norman.body import body_velocity, product_exp
+
         evaluate = ExpressionEvaluator(ops, {time_symbol(): t})
         g, rate, turn = ([evaluate(e) for e in row] for row in (reference.g, reference.rates, reference.accelerations))
         dual = DualArithmetic(ops)
@@ -235,7 +237,9 @@ def reference(
     if duration is not None:
         if not all(hasattr(formulas, name) for name in ("X", "u", "duration")):
             raise InputError("reference: duration= goes with a plan")
-        formulas = retimed(cast(Planned, formulas), float(duration))
+        from lie_codegen.control.retimed_plan import retimed
+
+        formulas = retimed(cast("Planned", formulas), float(duration))
     if samples is not None and waypoints is not None:
         raise InputError("reference: give waypoints, to rest at both ends, or samples of a smooth curve, not both")
     points = waypoints if samples is None else samples
@@ -246,12 +250,16 @@ def reference(
     if all(hasattr(formulas, name) for name in ("X", "u", "duration")):
         if start is not None:
             raise InputError("reference: a plan begins where it begins; start= goes with formulas")
-        return plan_reference(group, cast(Planned, formulas), smoothing=smoothing, tolerance=tolerance)
+        from lie_codegen.control.plan_reference import plan_reference
+
+        return plan_reference(group, cast("Planned", formulas), smoothing=smoothing, tolerance=tolerance)
     if smoothing is not None:
         raise InputError("reference: smoothing= goes with a plan")
     if formulas is not None:
         formulas = cast(Sequence[Any], formulas)
         return formula_reference(group, formulas, start=start)
+    from lie_codegen.control.waypoints import sampled_reference, waypoint_reference
+
     made = waypoint_reference if samples is None else sampled_reference
     return made(group, np.asarray(doubles(times)), np.asarray(doubles(points)))
 

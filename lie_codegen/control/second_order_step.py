@@ -22,7 +22,7 @@ from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port

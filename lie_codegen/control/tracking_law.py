@@ -36,7 +36,7 @@ from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star, bracket
 from lie_codegen.kernel.definition import kernel_factory

@@ -23,8 +23,8 @@ from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack, varying_entries
 from lie_codegen.groups.maps.matrices import matrix_port, random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.body import WeiNormanData
 from lie_codegen.groups.wei_norman.body import rate as wei_norman_rate
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, plain
 from lie_codegen.kernel.kernel import Kernel, Port

@@ -14,7 +14,6 @@ from typing import Any
 
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix
-from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import dexp_inverse
@@ -34,6 +33,8 @@ class Move:
 
     def __call__(self, ops: Arithmetic, X: Any, theta: Vector) -> Any:
         if self.derivation.matrix_pattern is None:
+            from lie_codegen.groups.maps.rkmk import times_taylor_exp
+
             return times_taylor_exp(self.group, ops, X, theta)
         return matmul(X, exp_matrix(ops, self.derivation, theta))
 

@@ -18,6 +18,7 @@ from lie_codegen.flow.magnus.run import BLOCK, MOST_STEPS, MagnusRun, as_run, ma
 from lie_codegen.flow.magnus.solver import LONG, REACHED, WaveRuns
 from lie_codegen.flow.magnus.tangents import tangents
 from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive, wave_numbers
+from lie_codegen.flow.propagation import Power, PropagationBatch
 from lie_codegen.flow.simulate import check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -115,42 +116,6 @@ class Propagation(Saved):
     def power(self, n: int) -> Power:
         """X(n T) = X(T)^n of a periodic input; see `Propagator.power`."""
         return self.of._power(self, n)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Power(Saved):
-    """X(T)^n.
-
-    Attributes:
-        X: (d, d).
-        n: the power.
-        error_estimate: n times that of one period and of rounding it: M^n cannot be known better than n |dM|.
-    """
-
-    X: Array
-    n: int
-    error_estimate: float
-
-    def __repr__(self) -> str:
-        return f"Power(n={self.n}, error_estimate={self.error_estimate:.2g})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PropagationBatch(Saved):
-    """X(T; p) at N values of p.
-
-    Attributes:
-        X: (N, d, d).
-        error_estimate: of the entries of all.
-        steps: of each, the same for all.
-    """
-
-    X: Array
-    error_estimate: float
-    steps: int
-
-    def __repr__(self) -> str:
-        return f"PropagationBatch({len(self.X)} members, {self.steps} steps, error_estimate={self.error_estimate:.2g})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

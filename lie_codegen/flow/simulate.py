@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError, SlowWarning
-from lie_codegen.flow.events import Event, event_function
+from lie_codegen.flow.events import Event, EventHits, event_function
 from lie_codegen.flow.events import Function as EventFunction
-from lie_codegen.flow.feedback_flow import FeedbackTrajectory, feedback_flow
 from lie_codegen.flow.feedback_law import Feedback, as_feedback
 from lie_codegen.flow.inputs import Signal, as_drive, as_signal, drive_signal
 from lie_codegen.flow.libraries import step_of
-from lie_codegen.flow.magnus.events import run_events
 from lie_codegen.flow.magnus.run import MOST_STEPS, MagnusRun, fixed_run, magnus_run, order_for
 from lie_codegen.flow.refined import refined
 from lie_codegen.flow.trajectory import Trajectory
@@ -118,7 +116,11 @@ def simulate(
     else:
         run = fixed_run(group, drive, times, start, order=order, steps=_count(group, steps), threads=threads)
     X = run.X if method in _FOURTH_ORDER else _with_start(start, run.X)
-    hits = run_events(group, drive, times, start, tuple(events), asked, order, run.longest) if asked else ()
+    hits: tuple[EventHits, ...] = ()
+    if asked:
+        from lie_codegen.flow.magnus.events import run_events
+
+        hits = run_events(group, drive, times, start, tuple(events), asked, order, run.longest)
     return Trajectory(
         group, times, X, run.steps, run.error_estimate, method if method in _FOURTH_ORDER else f"magnus{order}",
         drive.evaluations, drive.resolution, hits, drive, goal, run.multiple,
@@ -128,7 +130,7 @@ def simulate(
 def _feedback_run(
     group: MatrixGroup, law: Feedback, times: Array, eps: Array, start: Array, rtol: float, atol: float,
     method: str, steps: int | None, events: Sequence[Event], resolution: float | None, threads: int,
-) -> FeedbackTrajectory:  # fmt: skip
+) -> Trajectory:  # fmt: skip
     """A feedback, by the pair 8(5,3): it has no Magnus series, and no time at which it could be read beforehand."""
     given = {
         "method": method != "auto",
@@ -151,6 +153,8 @@ def _feedback_run(
             "thousand times slower than texts or a Kernel, which run in compiled loops",
             SlowWarning,
         )
+    from lie_codegen.flow.feedback_flow import feedback_flow
+
     return feedback_flow(group, law, times, eps, start, rtol=rtol, atol=atol, threads=threads)
 
 

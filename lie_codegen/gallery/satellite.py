@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.flow.simulate import simulate
-from lie_codegen.groups.build import build, generate
+from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import group
+from lie_codegen.groups.generate import generate
 from lie_codegen.groups.wei_norman.matrix import wei_norman
 from lie_codegen.pictures.result import GalleryResult, new_figure, save
 from lie_codegen.pictures.style import BLUE, GREY, RED, caption

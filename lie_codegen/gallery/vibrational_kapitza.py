@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.groups.build import build, generate
+from lie_codegen.groups.build import build
+from lie_codegen.groups.generate import generate
 from lie_codegen.mechanics.lagrangian import lagrangian_system
 from lie_codegen.mechanics.routh import routh_reduce
 from lie_codegen.mechanics.vibrational_average import VibrationalAverage, vibrational_average

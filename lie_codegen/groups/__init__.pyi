@@ -3,7 +3,6 @@
 from .autodiff.jax_function import jax_function as jax_function
 from .autodiff.torch_function import torch_function as torch_function
 from .build import build as build
-from .build import generate as generate
 from .cartan import cartan_involution as cartan_involution
 from .catalogue_load import group as group
 from .catalogue_names import group_names as group_names
@@ -16,6 +15,7 @@ from .conventions import tangent_to as tangent_to
 from .definition import from_brackets as from_brackets
 from .definition import from_matrices as from_matrices
 from .device_source import device_source as device_source
+from .generate import generate as generate
 from .jacobian import jacobian as jacobian
 from .kernels import group_kernels as group_kernels
 from .maps.barycentre import interpolate as interpolate

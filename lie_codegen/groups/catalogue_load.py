@@ -8,8 +8,6 @@ from pathlib import Path
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import UnknownGroupError
 from lie_codegen.groups.catalogue_names import definition_source, group_path, is_generated, plain_name
-from lie_codegen.groups.families import family
-from lie_codegen.groups.group_file import parse_group_file
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.groups.recorded import recorded
 
@@ -71,9 +69,20 @@ def group_of_source(name_or_path: str | Path, source: bytes) -> MatrixGroup:
 
 @lru_cache(maxsize=64)
 def _parsed(data: bytes, where: str) -> MatrixGroup:
-    return recorded(["file", data.decode("utf-8", errors="replace")], lambda: parse_group_file(data, where))
+    def made() -> MatrixGroup:
+        # what reads files is imported for a group that no record holds
+        from lie_codegen.groups.group_file import parse_group_file
+
+        return parse_group_file(data, where)
+
+    return recorded(["file", data.decode("utf-8", errors="replace")], made)
 
 
 @lru_cache(maxsize=64)
 def _generated(name: str) -> MatrixGroup:
-    return recorded(["family", name], lambda: family(name))
+    def made() -> MatrixGroup:
+        from lie_codegen.groups.families import family
+
+        return family(name)
+
+    return recorded(["family", name], made)

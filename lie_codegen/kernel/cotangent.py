@@ -37,8 +37,8 @@ class CotangentFunctions:
         self.signed = signed
         self._outer: dict[tuple[int, int], Scalar] = {}
 
-    def tail(self, a: int, order: int) -> Scalar:
-        """(1/order!) d^order/d mu^order of E[0, .., 0 (a times), mu], the a-th tail of E; order up to 2."""
+    def remainder(self, a: int, order: int) -> Scalar:
+        """(1/order!) d^order/d mu^order of E[0, .., 0 (a times), mu], the a-th remainder of E; order up to 2."""
         if is_zero(self.z):
             return self.ops.constant(taylor(a + order))
         if (a, order) not in self._done:
@@ -53,7 +53,7 @@ class CotangentFunctions:
                 return 1 + mu * self._near_tail(1, 0)
             return self._near_tail(1, order - 1) + mu * self._near_tail(1, order)
         pole = ops.constant(four_pi_squared())
-        # 2 / (pole + mu), shifted down a - 1 places and differentiated: the geometric series is its own tail.
+        # 2 / (pole + mu), shifted down a - 1 places and differentiated: the geometric series is its own remainder.
         scale = Fraction(2) * (-1) ** (a - 1 + order) / four_pi_squared() ** (a - 1)
         fraction = ops.constant(scale) / _power(pole + mu, order + 1)
         coefficients = [remainder(j) * comb(j - a + 1, order) for j in range(a - 1 + order, a - 1 + order + TERMS)]
@@ -63,7 +63,7 @@ class CotangentFunctions:
         return fraction + series
 
     def _outer_tail(self, a: int, order: int) -> Scalar:
-        """E by the cotangent, its derivatives by 2 z dE/dmu = E^2 - E + z/4, tails T_a = (T_{a-1} - T_{a-1}(0)) / mu."""
+        """E by the cotangent, its derivatives by 2 z dE/dmu = E^2 - E + z/4, remainders T_a = (T_{a-1} - T_{a-1}(0)) / mu."""
         if (a, order) not in self._outer:
             self._outer[a, order] = self._compute_outer(a, order)
         return self._outer[a, order]

@@ -6,10 +6,8 @@ record names its class, which must be a value of this package; a group stands th
 
 from __future__ import annotations
 
-import csv
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
@@ -73,11 +71,13 @@ def load(path: str | Path) -> Any:
     Raises:
         InputError: no such file, not one of ours, of a later version, or it names something that is no value of this package.
     """
+    from zipfile import BadZipFile
+
     try:
         with np.load(Path(path), allow_pickle=False) as data:
             entries = {name: data[name] for name in data.files}
         header = json.loads(bytes(entries.pop("header")).decode())
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, BadZipFile) as error:
         raise InputError(f"{path} is no file that save() wrote: {error}") from None
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise InputError(f"{path} is no file that save() wrote")
@@ -109,6 +109,8 @@ def value_of(record: Any) -> Any:
 
 def table_text(columns: Mapping[str, Array]) -> str:
     """CSV with a header line; numbers to the last bit."""
+    import csv
+
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(columns)

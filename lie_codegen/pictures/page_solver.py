@@ -14,7 +14,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.wasm import wasm_binary
 from lie_codegen.errors import InputError, MissingDependencyError
 from lie_codegen.flow.libraries import logarithms
-from lie_codegen.groups.build import generate
+from lie_codegen.groups.generate import generate
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.scene import motion_of
 from lie_codegen.steering.plan import Plan

@@ -53,7 +53,7 @@ def _only_direct(given: set[str]) -> bool:
 
 def _bounded(bounds: Any, controls: Sequence[Any]) -> bool:
     """Whether every one of few controls is bounded, as words of arcs need it."""
-    from lie_codegen.steering.direct.least_time import MOST_CONTROLS
+    from lie_codegen.steering.direct.arc_words import MOST_CONTROLS
 
     some = not isinstance(bounds, Mapping) or len(bounds) == len(controls)
     return bounds is not None and some and len(controls) <= MOST_CONTROLS

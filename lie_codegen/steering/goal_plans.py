@@ -14,7 +14,6 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InfeasibleError, SteeringError, SteeringInputError, UncontrollableError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.direct.method import direct
 from lie_codegen.steering.goals import GoalSet, cosets
 from lie_codegen.steering.methods import OPEN_LOOP, solver_of
 from lie_codegen.steering.plan import Plan
@@ -99,6 +98,8 @@ def _nearest(
     Raises:
         InfeasibleError: it is proved that even without obstacles the bounds do not allow it.
     """
+    from lie_codegen.steering.direct.method import direct
+
     still = options.get("dynamics") != "second_order"
     fixed = still and options.get("objective", "energy") == "energy"
     taken = ("weights", "start", *(("drift",) if still else ()), *(("bounds",) if fixed else ()))

@@ -4,49 +4,58 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from importlib import import_module
 from typing import Any
 
 from lie_codegen.errors import SteeringInputError
-from lie_codegen.steering.closed_form.area_rule import area_rule
-from lie_codegen.steering.closed_form.circle import circle
-from lie_codegen.steering.closed_form.four_phase import four_phase
-from lie_codegen.steering.closed_form.loops import loops
-from lie_codegen.steering.closed_form.sinusoids import sinusoids
-from lie_codegen.steering.closed_form.swing_twist import swing_twist
 from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.numbers import Options
 
 Method = Callable[..., Plan]
 
 
-class _Transcription:
-    """The method "transcription", whose module, and with it CasADi, is imported when it is asked for: shooting needs none."""
+class _Planner:
+    """A method that is imported when it is asked for: the first plan by shooting needs no other.
+
+    Args:
+        home: its module below lie_codegen.steering.
+        name: the function's name there.
+    """
+
+    def __init__(self, home: str, name: str) -> None:
+        self.home, self.name = home, name
 
     @property
     def method(self) -> Method:
-        from lie_codegen.steering.transcription.transcribe import transcription
-
-        return transcription
+        found: Method = getattr(import_module(f"lie_codegen.steering.{self.home}"), self.name)
+        return found
 
     @property
     def __kwdefaults__(self) -> dict[str, Any]:
-        return {**{each.name: each.default for each in fields(Options)}, "progress": None}
+        return self.method.__kwdefaults__ or {}
 
     def __call__(self, task: Task, **options: Any) -> Plan:
         return self.method(task, **options)
 
 
+class _Transcription(_Planner):
+    """Its options are a record's fields: they are known before CasADi is imported."""
+
+    @property
+    def __kwdefaults__(self) -> dict[str, Any]:
+        from lie_codegen.steering.transcription.numbers import Options
+
+        return {**{each.name: each.default for each in fields(Options)}, "progress": None}
+
+
 OPEN_LOOP: Mapping[str, Method] = {
-    "four_phase": four_phase,
-    "circle": circle,
-    "swing_twist": swing_twist,
-    "sinusoids": sinusoids,
-    "area_rule": area_rule,
-    "loops": loops,
+    **{
+        name: _Planner(f"closed_form.{name}", name)
+        for name in ("four_phase", "circle", "swing_twist", "sinusoids", "area_rule", "loops")
+    },
     "optimal": optimal,
-    "transcription": _Transcription(),
+    "transcription": _Transcription("transcription.transcribe", "transcription"),
 }
 
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,7 +19,6 @@ from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved, json_value, table_text
-from lie_codegen.steering.plan_sketch import moments, sketch
 from lie_codegen.values import Value, settle
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
@@ -316,6 +314,10 @@ class Plan(Saved):
 
     def _repr_html_(self) -> str:
         """In a notebook: the few lines of its repr, and a small picture of what its controls do."""
+        from html import escape
+
+        from lie_codegen.steering.plan_sketch import moments, sketch
+
         t = moments(self.duration)
         curves = self.inputs(t).reshape(t.size, -1)
         columns = curves.shape[1]

@@ -12,7 +12,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.studies.distributions import Designed, Distribution, Grid, Joint, LatinHypercube, Sobol
+from lie_codegen.studies.designs import Designed, LatinHypercube, Sobol
+from lie_codegen.studies.distributions import Distribution, Grid, Joint
 from lie_codegen.studies.draws import uniforms
 
 _LARGEST_DESIGN = 20_000_000

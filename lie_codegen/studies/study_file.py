@@ -39,8 +39,9 @@ import numpy as np
 from lie_codegen import averaging, control, flow, signals, steering
 from lie_codegen.errors import InputError
 from lie_codegen.studies import distributions
+from lie_codegen.studies.result import Study
 from lie_codegen.studies.stopping import Quantile
-from lie_codegen.studies.study import Study, open_study, study
+from lie_codegen.studies.study import open_study, study
 from lie_codegen.studies.tasks import Run
 
 _FUNCTIONS = {

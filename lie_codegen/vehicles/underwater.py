@@ -24,7 +24,7 @@ from lie_codegen.exact.positive_matrix import eigenvalues, positive_matrix, real
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.body import WeiNormanData
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star
 from lie_codegen.kernel.definition import kernel_factory, record_factory

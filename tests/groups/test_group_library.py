@@ -20,7 +20,7 @@ import lie_codegen as lc
 from lie_codegen.codegen.package import render_library
 from lie_codegen.errors import GroupFileError, InputError, JacobiError, NoCompilerWarning
 from lie_codegen.groups import group_library, prebuilt
-from lie_codegen.groups.build import object_definition, source_definition
+from lie_codegen.groups.buildable import object_definition, source_definition
 from lie_codegen.groups.catalogue_names import definition_source, group_path
 from lie_codegen.groups.kernels import KERNEL_NAMES, group_kernel
 from lie_codegen.groups.prebuilt import find_prebuilt, prebuilt_folder

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import lie_codegen as lc
-from lie_codegen.groups.build import object_definition, source_definition
+from lie_codegen.groups.buildable import object_definition, source_definition
 from lie_codegen.groups.catalogue_names import definition_source
 from lie_codegen.groups.prebuilt import SHARED_STORE, TEMPLATES, file_digest, made_from_digest, prebuilt_folder, sealed
 from lie_codegen.runtime.digests import digest, versions

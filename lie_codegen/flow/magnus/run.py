@@ -9,7 +9,6 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
-from lie_codegen.flow.magnus import numpy_steps
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.library import MagnusLibrary, magnus_library
 from lie_codegen.flow.magnus.norms import norms_of
@@ -185,6 +184,8 @@ def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, 
     library = magnus_library(group)
     many = len(X0) if X0.ndim == 3 else drive.many
     if library is None:
+        from lie_codegen.flow.magnus import numpy_steps
+
         return numpy_steps.flow(group, drive, steps, order, X0)
     if many is not None:
         parts = share_out(

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,12 +20,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.groups.build import build
-from lie_codegen.groups.derivation import GroupDerivation
-from lie_codegen.groups.maps.defect import Figure, figures_of
-from lie_codegen.groups.maps.nearest import nearest
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.arithmetic import FloatArithmetic
-from lie_codegen.kernel.complex_scalar import Complex
 
 if TYPE_CHECKING:
     from lie_codegen.runtime.library import Library
@@ -69,11 +64,17 @@ def admitted(group: MatrixGroup, X: ArrayLike, where: str) -> Admitted:
             kappa = 1.0
     if off <= ON_GROUP * kappa:
         return Admitted(matrix, 0.0)
+    # what mends and explains is imported for the few elements that are off
     if off <= _DOUBTFUL:
+        from lie_codegen.groups.maps.nearest import nearest
+
         found = nearest(group, matrix)
         if off <= NEAR_GROUP or np.max(np.abs(found.X - matrix)) <= NEAR_GROUP:
             return Admitted(found.X, float(found.distance))
-    raise NotOnGroupError(f"{where} is not on the group {group.name}: {_why(group, matrix)}")
+    from lie_codegen.groups.maps.refusal import why_refused
+
+    reason = why_refused(group, matrix, lambda other: float(_library(group).defect(other)))
+    raise NotOnGroupError(f"{where} is not on the group {group.name}: {reason}")
 
 
 def admitted_all(group: MatrixGroup, X: Array, where: str) -> tuple[Array, Array]:
@@ -111,48 +112,3 @@ def _matrix(group: MatrixGroup, X: ArrayLike, where: str) -> Array:
 @lru_cache(maxsize=64)
 def _library(group: MatrixGroup) -> Library:
     return build(group)
-
-
-@lru_cache(maxsize=64)
-def _derivation(group: MatrixGroup) -> GroupDerivation:
-    return GroupDerivation(group)
-
-
-def _why(group: MatrixGroup, matrix: Array) -> str:
-    """The worst condition as a difference, the distance of the nearest element, and what to do."""
-    determinant = complex(np.linalg.det(matrix))
-    if abs(determinant) < 1e-300:
-        return "it is singular"
-    entries: Any = matrix.tolist()
-    if group.is_complex:
-        entries = [[Complex(z.real, z.imag) for z in row] for row in entries]
-    figures: list[Figure] = figures_of(FloatArithmetic(), _derivation(group), entries)
-    name, _, plain = max(figures, key=lambda figure: figure[1])
-    worst = f"{name} = {_number(plain)}"
-    phase = _phase(group, matrix, determinant)
-    if phase:
-        return f"{worst}; {phase}"
-    try:
-        found = nearest(group, matrix)
-    except NotOnGroupError as error:
-        return f"{worst}; no element is nearest to it ({error})"
-    return f"{worst}; the nearest element is {float(found.distance):.3g} away: lc.nearest({group.name!r}, X) gives it"
-
-
-def _number(plain: Any) -> str:
-    return f"{complex(plain.re, plain.im):.3g}" if isinstance(plain, Complex) else f"{float(plain):.3g}"
-
-
-def _phase(group: MatrixGroup, matrix: Array, determinant: complex) -> str:
-    """Where a unitary matrix misses SU(n) by its phase alone: a gate, which physics knows up to a phase."""
-    d = group.degree
-    if not group.is_complex or np.max(np.abs(matrix.conj().T @ matrix - np.eye(d))) > NEAR_GROUP:
-        return ""
-    angle = -np.angle(determinant) / d
-    turned = np.ascontiguousarray(np.exp(1j * angle) * matrix)
-    if abs(determinant - 1) <= NEAR_GROUP or not float(_library(group).defect(turned)) <= NEAR_GROUP:
-        return ""
-    return (
-        f"the matrix is unitary and a phase takes it there: X exp({angle:.10g}j), or this times exp(2 pi i k / {d}); "
-        "lc.UpToPhase(X) lets a steering task choose"
-    )

@@ -9,7 +9,6 @@ from typing import Any
 
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.admission import NEAR_GROUP
-from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
@@ -27,6 +26,8 @@ def nan_off_group(kernel: Kernel, group: MatrixGroup, ports: Iterable[str]) -> K
     data, inner = GroupDerivation(group), kernel.body
 
     def body(ops: Arithmetic, *arguments: Any) -> tuple[Any, ...]:
+        from lie_codegen.groups.maps.defect import defect
+
         worst = [defect(ops, data, arguments[place]) for place in places]
         on_group = [ops.less(each, ops.constant(NEAR_GROUP)) for each in worst]
         return tuple(kept_where(ops, on_group, output) for output in inner(ops, *arguments))

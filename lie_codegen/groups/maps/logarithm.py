@@ -16,7 +16,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.maps.analytic_functions import RIGHT_JACOBIAN_INVERSE
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian, real_coordinates
+from lie_codegen.groups.maps.linear_family import LinearFamily
 from lie_codegen.groups.maps.log_blocks import (
     Entries,
     complex2_log,
@@ -30,7 +32,7 @@ from lie_codegen.groups.maps.log_blocks import (
 )
 from lie_codegen.groups.maps.log_structure import LogBlock, LogStructure
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.maps.matrix_function import RIGHT_JACOBIAN_INVERSE, FunctionOfMatrix, LinearFamily
+from lie_codegen.groups.maps.matrix_function import FunctionOfMatrix
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, Vector, matadd, matmul, matvec, number, plus

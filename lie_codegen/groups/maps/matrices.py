@@ -8,7 +8,7 @@ from typing import Any
 
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.complex_scalar import Complex
@@ -120,4 +120,6 @@ def velocity_units(group: MatrixGroup, per: str = "s") -> str:
 
 def random_element(group: MatrixGroup, data: WeiNormanData, rng: random.Random, reach: float = 1.0) -> list[list[Any]]:
     """exp(g_1 A_1) ... exp(g_n A_n) with g uniform in [-reach, reach]."""
+    from lie_codegen.groups.wei_norman.body import product_exp
+
     return product_exp(FloatArithmetic(), data, [rng.uniform(-reach, reach) for _ in range(group.dim)])

@@ -6,195 +6,20 @@ With mu = lambda^2 and f(lambda) = even(mu) + lambda odd(mu), Newton's interpola
     f(A) e_j = sum_{i < a} even_i A^{2 i} e_j + sum_{s < m} even[0^a, (-q)^{s+1}] A^{2 a} (A^2 + q)^s e_j + the same with
                A odd and a = floor(k/2) in place of ceil(k/2),
 
-where even_i are Taylor coefficients and the divided differences are derivatives in mu of the tails of the series: smooth in
+where even_i are Taylor coefficients and the divided differences are derivatives in mu of the remainders of the series: smooth in
 x, entire for exp and (e^t - 1)/t. (Hermite interpolation on the spectrum, the definition of a function of a matrix.)
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from fractions import Fraction
-from math import factorial
-from typing import Any, Protocol
+from collections.abc import Sequence
 
 from lie_codegen.exact.quadratic_form import QuadraticForm
 from lie_codegen.exact.spectral_pattern import ColumnPattern
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
-from lie_codegen.kernel.cotangent import CotangentFunctions, taylor
-from lie_codegen.kernel.linear import number
+from lie_codegen.groups.maps.analytic_functions import MatrixFunction, Remainder, Values
+from lie_codegen.groups.maps.linear_family import LinearFamily, Sparse
+from lie_codegen.kernel.arithmetic import Scalar
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
-from lie_codegen.kernel.stumpff import StumpffFunctions, derivative_weights
-from lie_codegen.on_demand import sympy as sp
-
-#: (odd, a, order): the tail after a Taylor terms of the even or odd part, differentiated.
-Tail = tuple[bool, int, int]
-
-
-class Values(Protocol):
-    """The tails of one function at one z."""
-
-    def tail(self, tail: Tail) -> Scalar: ...
-
-
-class MatrixFunction(Protocol):
-    """An analytic function of a matrix, by the series of its even and odd parts in mu = lambda^2."""
-
-    def taylor(self, odd: bool, i: int) -> Fraction:
-        """The coefficient of mu^i."""
-
-    def at(self, ops: Arithmetic, z: Scalar, tails: Sequence[Tail], *, signed: bool) -> Values:
-        """The tails wanted at mu = -z."""
-
-
-@dataclass(frozen=True)
-class ExponentialFunction:
-    """sum_j lambda^j / (j + shift)! with the sign of its odd part: exp (shift 0), (e^t - 1)/t (shift 1), both at +-t."""
-
-    shift: int
-    sign: int = 1
-
-    def taylor(self, odd: bool, i: int) -> Fraction:
-        return Fraction(self.sign if odd else 1, factorial(2 * i + odd + self.shift))
-
-    def at(self, ops: Arithmetic, z: Scalar, tails: Sequence[Tail], *, signed: bool) -> Values:
-        return _StumpffValues(self, ops, z, tails, signed)
-
-    def index(self, tail: Tail) -> int:
-        """The k of the c_k that the tail is."""
-        return 2 * tail[1] + tail[0] + self.shift
-
-
-class _StumpffValues:
-    def __init__(
-        self, function: ExponentialFunction, ops: Arithmetic, z: Scalar, tails: Sequence[Tail], signed: bool
-    ) -> None:
-        self.function = function
-        top = max((max(derivative_weights(function.index(t), t[2])) for t in tails), default=0)
-        self.c = StumpffFunctions(ops, z, top, signed=signed)
-
-    def tail(self, tail: Tail) -> Scalar:
-        value = self.c.derivative(self.function.index(tail), tail[2])
-        return -value if tail[0] and self.function.sign < 0 else value
-
-
-@dataclass(frozen=True)
-class BernoulliFunction:
-    """t/(e^t - 1) = (t/2) coth(t/2) - t/2; the sign of its odd part is that of t in (e^{-t} - 1)."""
-
-    sign: int = 1
-
-    def taylor(self, odd: bool, i: int) -> Fraction:
-        if odd:
-            return Fraction(-self.sign, 2) if i == 0 else Fraction(0)
-        return taylor(i)
-
-    def at(self, ops: Arithmetic, z: Scalar, tails: Sequence[Tail], *, signed: bool) -> Values:
-        return _CotangentValues(self, ops, z, signed)
-
-
-class _CotangentValues:
-    def __init__(self, function: BernoulliFunction, ops: Arithmetic, z: Scalar, signed: bool) -> None:
-        self.function = function
-        self.ops = ops
-        self.values = CotangentFunctions(ops, z, signed=signed)
-
-    def tail(self, tail: Tail) -> Scalar:
-        odd, a, order = tail
-        if odd:
-            return 0 if a + order else self.ops.constant(self.function.taylor(True, 0))
-        return self.values.tail(a, order)
-
-
-EXP = ExponentialFunction(0)
-LEFT_JACOBIAN = ExponentialFunction(1)
-RIGHT_JACOBIAN = ExponentialFunction(1, -1)
-LEFT_JACOBIAN_INVERSE = BernoulliFunction()
-RIGHT_JACOBIAN_INVERSE = BernoulliFunction(-1)
-
-Sparse = dict[int, Scalar]
-
-
-class LinearFamily:
-    """A(x) = sum_i x_i A_i at one x, with its square and its quadratic forms; products of coordinates are shared."""
-
-    def __init__(self, ops: Arithmetic, matrices: Sequence[sp.MatrixBase], x: Sequence[Scalar]) -> None:
-        self.ops = ops
-        self.x = x
-        self.size = int(matrices[0].rows)
-        self.columns: list[dict[int, dict[int, Any]]] = [{} for _ in range(self.size)]
-        for i, matrix in enumerate(matrices):
-            for r, row in enumerate(matrix.tolist()):
-                for c, value in enumerate(row):
-                    if value != 0 and not is_zero(x[i]):
-                        self.columns[c].setdefault(r, {})[i] = value
-        self._polynomials: dict[Any, tuple[Any, Scalar]] = {}
-        self._monomials: dict[tuple[int, ...], Scalar] = {}
-
-    def form(self, form: QuadraticForm) -> Scalar:
-        """q(x)."""
-        return self._signed(self._polynomial(dict(form.coefficients)))
-
-    def apply(self, column: Mapping[int, Scalar]) -> Sparse:
-        """A v for a sparse v."""
-        result: Sparse = {}
-        for c, value in column.items():
-            for r, entry in self.columns[c].items():
-                sign, linear = self._polynomial({(i,): a for i, a in entry.items()})
-                term = product(product(linear, value), sign)
-                result[r] = add(result.get(r, 0), term)
-        return result
-
-    def first(self, j: int) -> dict[int, tuple[int, Scalar]]:
-        """A e_j as (sign, value): equal entries up to sign are one value."""
-        return {r: self._polynomial({(i,): a for i, a in entry.items()}) for r, entry in self.columns[j].items()}
-
-    def second(self, j: int) -> dict[int, tuple[int, Scalar]]:
-        """A^2 e_j, from its exact quadratic polynomials."""
-        # Summed exactly before any arithmetic: A^2 of a Lie algebra loses most of its terms (of so(3) w w^T - |w|^2 remains), and a term that
-        # cancels here is neither computed nor rounded. An entry whose polynomial is zero is zero for every x and is left out.
-        squares: dict[int, dict[tuple[int, ...], Any]] = {}
-        for c, entry in self.columns[j].items():
-            for r, other in self.columns[c].items():
-                polynomial = squares.setdefault(r, {})
-                for i, a in entry.items():
-                    for k, b in other.items():
-                        key = (min(i, k), max(i, k))
-                        polynomial[key] = sp.expand(polynomial.get(key, 0) + a * b)
-        result = {}
-        for r, polynomial in squares.items():
-            left = {key: value for key, value in polynomial.items() if value != 0}
-            if left:
-                result[r] = self._polynomial(left)
-        return result
-
-    def _signed(self, pair: tuple[int, Scalar]) -> Scalar:
-        return product(pair[1], pair[0])
-
-    def _polynomial(self, polynomial: Mapping[tuple[int, ...], Any]) -> tuple[int, Scalar]:
-        """A homogeneous polynomial, up to a sign that makes its first coefficient positive."""
-        # With the first coefficient positive p and -p have one key, so that the two entries +-w_3 of a rotation cost one value.
-        items = sorted(polynomial.items())
-        sign = -1 if items[0][1].is_negative else 1
-        key = tuple((m, sign * value) for m, value in items)
-        if key not in self._polynomials:
-            total: Scalar = 0
-            # One common factor is taken out: (a^2 + b^2) / 4 rather than a^2 / 4 + b^2 / 4.
-            scale = key[0][1]
-            for m, value in key:
-                ratio = sp.radsimp(value / scale)
-                term = self._monomial(m)
-                if ratio == -1 and not is_zero(total):
-                    total = total - term
-                else:
-                    total = add(total, product(number(self.ops, ratio), term))
-            self._polynomials[key] = (1, product(number(self.ops, scale), total))
-        return sign, self._polynomials[key][1]
-
-    def _monomial(self, m: tuple[int, ...]) -> Scalar:
-        if m not in self._monomials:
-            self._monomials[m] = self.x[m[0]] if len(m) == 1 else product(self.x[m[0]], self.x[m[1]])
-        return self._monomials[m]
 
 
 class FunctionOfMatrix:
@@ -247,11 +72,13 @@ class FunctionOfMatrix:
 
     def _at(self, form: QuadraticForm, pattern: ColumnPattern) -> tuple[Scalar, Values]:
         if form not in self._values:
-            # All tails that any column with this q will ask for, at once: they share one sine, one cosine, one square root of q.
+            # All remainders that any column with this q will ask for, at once: they share one sine, one cosine, one square root of q.
             z = self.family.form(form) if not self._vanishes(form) else 0
-            tails = sorted(set(_tails(pattern)) | {t for p in self.patterns if p.form == form for t in _tails(p)})
+            remainders = sorted(
+                set(_remainders(pattern)) | {t for p in self.patterns if p.form == form for t in _remainders(p)}
+            )
             signed = not form.is_nonnegative
-            self._values[form] = (z, self.function.at(self.ops, z, tails, signed=signed))
+            self._values[form] = (z, self.function.at(self.ops, z, remainders, signed=signed))
         return self._values[form]
 
     def _vanishes(self, form: QuadraticForm) -> bool:
@@ -261,7 +88,7 @@ class FunctionOfMatrix:
         """((power, s), coefficient): f(A) e_j = sum of coefficient A^power (A^2 + q)^s e_j."""
         # A^(2 i + odd) for the node 0, counted in mu = lambda^2: of k zeros in lambda the even part has ceil(k/2), the odd one, which has a lambda in
         # front, floor(k/2). Behind them the node -q: the divided difference over 0 (a times) and -q (s + 1 times) is the s-th derivative
-        # of the tail of the series after a terms, over s!, which is entire in q: nothing is divided by q.
+        # of the remainder of the series after a terms, over s!, which is entire in q: nothing is divided by q.
         terms: list[tuple[tuple[int, int], Scalar]] = []
         for odd in (False, True):
             a = _zeros(pattern, odd)
@@ -271,7 +98,7 @@ class FunctionOfMatrix:
                 terms.append(((2 * i + odd, 0), constant))
             if pattern.form is not None:
                 values = self._at(pattern.form, pattern)[1]
-                terms += [((2 * a + odd, s), values.tail((odd, a, s))) for s in range(pattern.pairs)]
+                terms += [((2 * a + odd, s), values.remainder((odd, a, s))) for s in range(pattern.pairs)]
         return terms
 
 
@@ -279,7 +106,7 @@ def _zeros(pattern: ColumnPattern, odd: bool) -> int:
     return pattern.zeros // 2 if odd else (pattern.zeros + 1) // 2
 
 
-def _tails(pattern: ColumnPattern) -> list[Tail]:
+def _remainders(pattern: ColumnPattern) -> list[Remainder]:
     return [(odd, _zeros(pattern, odd), s) for odd in (False, True) for s in range(pattern.pairs)]
 
 

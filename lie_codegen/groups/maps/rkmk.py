@@ -10,7 +10,8 @@ from typing import Any
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.short_exponential import short_pattern, times_short_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp, rate
+from lie_codegen.groups.wei_norman.body import product_exp, rate
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.brackets import dexp_inverse
 from lie_codegen.kernel.complex_scalar import Complex

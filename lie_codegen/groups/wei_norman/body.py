@@ -10,50 +10,16 @@ Wei and Norman, Proc. AMS 15 (1964) 327; Leonard and Krishnaprasad, TR 93-59, (1
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
-from lie_codegen.algebra.adjoint import ad
-from lie_codegen.exact.exponential import MatrixExponential, matrix_exponential
-from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
-from lie_codegen.groups.wei_norman.frames import Factors, Frames, Step, cheapest_steps, times_vector
+from lie_codegen.groups.wei_norman.frames import Factors, Frames, times_vector
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import SparseMatrix
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.structural_zeros import add, product
-from lie_codegen.on_demand import sympy as sp
-
-
-@dataclass(frozen=True)
-class WeiNormanData:
-    """exp(x ad_k) and exp(x A_k) of every basis element, derived once a group."""
-
-    group: MatrixGroup
-
-    @cached_property
-    def adjoint(self) -> tuple[MatrixExponential, ...]:
-        """exp(x ad_{A_k}) for each k."""
-        return tuple(matrix_exponential(ad(self.group.algebra, k)) for k in range(self.group.dim))
-
-    @cached_property
-    def steps(self) -> tuple[Step, ...]:
-        """How M(g)^{-1} g' = u is solved."""
-        return cheapest_steps(self.adjoint)
-
-    @cached_property
-    def defining(self) -> tuple[MatrixExponential, ...]:
-        """exp(x A_k) for each k; a complex A_k in its real form [[Re, -Im], [Im, Re]]."""
-        return tuple(matrix_exponential(_real_form(self.group, k)) for k in range(self.group.dim))
-
-
-def _real_form(group: MatrixGroup, k: int) -> sp.MatrixBase:
-    matrix = group.exact_basis[k]
-    if not group.is_complex:
-        return matrix
-    re, im = matrix.applyfunc(sp.re), matrix.applyfunc(sp.im)
-    return sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re))
 
 
 def inverse_columns(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> SparseMatrix:

@@ -15,7 +15,8 @@ from typing import cast
 from lie_codegen.algebra.adjoint import ad
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.body import WeiNormanData, inverse_columns
+from lie_codegen.groups.wei_norman.body import inverse_columns
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
 from lie_codegen.groups.wei_norman.frames import times_vector
 from lie_codegen.groups.wei_norman.ring_factors import factors as factors_of

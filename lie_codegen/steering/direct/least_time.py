@@ -11,15 +11,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import NotFiniteError, ShapeError, SteeringError, SteeringInputError
-from lie_codegen.flow.batched_exponential import expm
+from lie_codegen.errors import SteeringError
+from lie_codegen.steering.direct.arc_words import letters_of, long_words, longest_useful, short_words
 from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.flight import landed
@@ -30,10 +29,6 @@ from lie_codegen.steering.direct.report import error_at, plan_of
 from lie_codegen.steering.direct.search import threshold
 from lie_codegen.steering.plan import Plan, Status
 
-#: Words of n arcs are all tried up to that many; else as many drawn at random.
-_MOST_WORDS = 1024
-#: Random durations of each word, at least; lanes in all, at most.
-_EACH, _MOST_LANES = 2, 4096
 #: Arcs of a long word, in units of the group's dimension.
 _LONG = 3
 _KEPT = 64
@@ -43,7 +38,6 @@ _GONE = 1e-9
 _AGREEING = 1e-3
 #: Starts that must agree on the shortest before another round is not tried.
 _ENOUGH = 3
-MOST_CONTROLS = 4
 
 
 def least_time(
@@ -65,10 +59,10 @@ def least_time(
         SteeringError: no word of arcs was found that reaches the goal.
     """
     began = time.perf_counter()
-    letters, velocities = _letters(task, vertices)
+    letters, velocities = letters_of(task, vertices)
     solver = machine(task.system.group, 1)
     arcs = replace(task, low=np.zeros(1), high=np.ones(1), weights=np.ones(1))
-    limits = _limits(task, velocities, longest)
+    limits = longest_useful(task, velocities, longest)
     tried: list[str] = []
     best: list[tuple[float, Array, Array, int]] = []
     nearest: tuple[float, Array, Array, int] | None = None
@@ -80,9 +74,9 @@ def least_time(
         bangs = np.flatnonzero(np.all(letters != 0, axis=1))
         bangs = bangs if len(bangs) > 1 else np.arange(len(letters))
         for name, words in (
-            ("short words", _short_words(len(letters), n, starts, rng)),
-            ("long words", _long_words(len(letters), long, 4 * starts, rng)),
-            ("long words without zeros", bangs[_long_words(len(bangs), long, 2 * starts, rng)]),
+            ("short words", short_words(len(letters), n, starts, rng)),
+            ("long words", long_words(len(letters), long, 4 * starts, rng)),
+            ("long words without zeros", bangs[long_words(len(bangs), long, 2 * starts, rng)]),
         ):
             found, near = _solve(arcs, solver, velocities, limits, words, settings, longest, rng)
             nearest = near if nearest is None or near[0] < nearest[0] else nearest
@@ -161,83 +155,6 @@ def _not_found(
     took = {"solve": time.perf_counter() - began}
     plan = plan_of(task, target, flown, variant, tolerance, "time", details, took, Status.NOT_FOUND)
     return SteeringError(said, best=plan, violation=plan.violation)
-
-
-def _letters(task: Manoeuvre, vertices: ArrayLike | None) -> tuple[Array, Array]:
-    """(L, m) controls at a bound or zero, or those given, and hat of the velocities they make in the unit of the given duration (L, d, d)."""
-    name = task.system.group.name
-    if not task.system.steady:
-        raise SteeringInputError(
-            f'steer({name}): objective="time" needs controls and a drift that do not depend on time'
-        )
-    if vertices is not None:
-        return _given(task, vertices)
-    unbounded = [
-        label for label, a, b in zip(task.system.labels, task.low, task.high, strict=True) if not np.isfinite(b - a)
-    ]
-    if unbounded:
-        raise SteeringInputError(f'steer({name}): objective="time" needs bounds; {", ".join(unbounded)} has none')
-    if task.controls > MOST_CONTROLS:
-        raise SteeringInputError(
-            f'steer({name}): objective="time" takes at most {MOST_CONTROLS} controls, got {task.controls}'
-        )
-    choices = [(a, 0.0, b) if a < 0 < b else (a, b) for a, b in zip(task.low, task.high, strict=True)]
-    return _moving(task, np.array(list(product(*choices))))
-
-
-def _given(task: Manoeuvre, vertices: ArrayLike) -> tuple[Array, Array]:
-    """The caller's own control vectors, within the bounds."""
-    name, m = task.system.group.name, task.controls
-    letters = np.array(vertices, dtype=float)
-    if letters.ndim != 2 or letters.shape[1] != m or not len(letters):
-        raise ShapeError(
-            f"steer({name}): vertices have shape {letters.shape}; give (k, {m}), a vector of controls for each arc"
-        )
-    if not np.all(np.isfinite(letters)):
-        raise NotFiniteError(f"steer({name}): vertices hold NaN or infinity")
-    if np.any(letters < task.low - 1e-12) or np.any(letters > task.high + 1e-12):
-        raise SteeringInputError(f"steer({name}): a vertex breaks the bounds")
-    return _moving(task, letters)
-
-
-def _moving(task: Manoeuvre, letters: Array) -> tuple[Array, Array]:
-    velocities = task.system.group.hat(task.duration * task.system.velocity(np.zeros(len(letters)), letters))
-    moving = np.max(np.abs(velocities), axis=(1, 2)) > 0
-    return letters[moving], velocities[moving]
-
-
-def _limits(task: Manoeuvre, velocities: Array, longest: float) -> Array:
-    """(L,) longest useful duration of each letter: its period, where exp(s V) returns to the identity."""
-    limits = np.full(len(velocities), float(longest))
-    for number, V in enumerate(velocities):
-        rates = np.abs(np.linalg.eigvals(V).imag)
-        rates = rates[rates > 1e-9]
-        if len(rates):
-            turns = 2 * np.pi / np.min(rates) * np.arange(1, 5)
-            back = expm(turns[:, None, None] * V)
-            home = np.max(np.abs(back - np.eye(len(V))), axis=(1, 2)) < 1e-9
-            if np.any(home):
-                limits[number] = min(longest, float(turns[np.argmax(home)]))
-    return limits
-
-
-def _short_words(letters: int, arcs: int, starts: int, rng: np.random.Generator) -> Array:
-    """(lanes, arcs) all words without the same letter twice in a row, repeated; or some of them."""
-    count = letters * max(letters - 1, 1) ** (arcs - 1)
-    if count > _MOST_WORDS:
-        return _long_words(letters, arcs, _MOST_WORDS * _EACH, rng)
-    words = np.array([w for w in product(range(letters), repeat=arcs) if all(a != b for a, b in pairwise(w))])
-    if not len(words):
-        words = np.zeros((1, arcs), int)
-    return np.repeat(words, min(max(_EACH, starts), max(_EACH, _MOST_LANES // len(words))), axis=0)
-
-
-def _long_words(letters: int, arcs: int, lanes: int, rng: np.random.Generator) -> Array:
-    """(lanes, arcs) random words without the same letter twice in a row."""
-    words = rng.integers(0, letters, (lanes, arcs))
-    for k in range(1, arcs if letters > 1 else 0):
-        words[:, k] = (words[:, k - 1] + rng.integers(1, letters, lanes)) % letters
-    return words
 
 
 def _solve(

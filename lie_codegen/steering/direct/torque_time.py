@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -24,9 +23,9 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.numpy_search import Box, descend, reach
-from lie_codegen.steering.direct.programme import Goal, Settings
+from lie_codegen.steering.direct.programme import Settings
 from lie_codegen.steering.direct.system import System, Velocity
-from lie_codegen.steering.direct.torque_arcs import TorqueArcs, euler_constants
+from lie_codegen.steering.direct.torque_words import GONE, TorqueWord, arcs_of, tidied, torque_words, word_box
 from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 from lie_codegen.steering.start import placed, seen_from
@@ -34,8 +33,8 @@ from lie_codegen.steering.task import Task, make_task
 from lie_codegen.steering.transcription.numbers import Dynamics, Numbers, Options
 from lie_codegen.steering.transcription.pose import pose
 
-#: Words of a round for each start asked for, and the share of controls that stay off.
-_LANES, _OFF = 16, 0.15
+#: Words of a round for each start asked for.
+_LANES = 16
 #: Switches of each control in the first round, at most; one more in each later round.
 _SWITCHES = 2
 #: Steps of an arc in the search, in the last descent, and for the last digits.
@@ -43,21 +42,11 @@ _COARSE, _MIDDLE, _FINE = 3, 10, 48
 _ROUGH = 1e-9
 #: Words that are descended, the best of them whose switches pass each other, and those that are sharpened.
 _DESCENDED, _PASSED, _SHARPENED = 24, 8, 3
-_GONE, _BRIEF = 1e-7, 1e-3
+_BRIEF = 1e-3
 _AGREEING, _ENOUGH = 1e-3, 3
 _MOST_CONTROLS = 6
 #: States an arc that are kept.
 _SHOWN = 16
-
-
-@dataclass(frozen=True, eq=False)
-class _Word:
-    """Torques (K, m) of arcs in unit time, their durations (K,), and their sum."""
-
-    torques: Array = field(repr=False)
-    durations: Array = field(repr=False)
-    total: float
-    size: float
 
 
 def least_time_torques(
@@ -152,25 +141,25 @@ def least_time_torques(
 def _searched(
     task: Task, numbers: Numbers, second: Dynamics, starts: int, rounds: int, iterations: int, seed: int, longest: float,
     say: Callable[[str], None],
-) -> tuple[list[_Word], tuple[str, ...], int]:  # fmt: skip
+) -> tuple[list[TorqueWord], tuple[str, ...], int]:  # fmt: skip
     """Words, those that reach the target first, the shortest first; what was tried; starts in all."""
     low, high = numbers.bounds
     tried: list[str] = []
-    found: list[_Word] = []
+    found: list[TorqueWord] = []
     lanes = _LANES * starts
     settings = Settings(True, iterations, iterations, enough=_ROUGH, relative=1e-6)
     for round_ in range(rounds):
         rng = np.random.default_rng([seed, round_, 17])
-        torques = _words(low, high, lanes, _SWITCHES + round_, rng)
+        torques = torque_words(low, high, lanes, _SWITCHES + round_, rng)
         durations = rng.dirichlet(np.ones(torques.shape[1]), lanes) * 3.0 ** rng.uniform(-1, 0.5, (lanes, 1))
-        box = _box(torques.shape[1], longest)
-        arrived = reach(_arcs(task, second, torques, _COARSE).look, box, durations, settings)
+        box = word_box(torques.shape[1], longest)
+        arrived = reach(arcs_of(task, second, torques, _COARSE).look, box, durations, settings)
         there = np.flatnonzero(arrived.size <= 10 * _ROUGH)
         tried.append(f"round {round_ + 1}: {len(there)} of {lanes} words of {torques.shape[1]} arcs arrive")
         say(tried[-1])
         if not len(there):
             lane = int(np.argmin(arrived.size))
-            found.append(_tidied(torques[lane], arrived.u[lane], float(arrived.size[lane])))
+            found.append(tidied(torques[lane], arrived.u[lane], float(arrived.size[lane])))
             continue
         there = there[np.argsort(arrived.cost[there], kind="stable")][:_DESCENDED]
         found += _descended(task, second, torques[there], arrived.u[there], box, settings)
@@ -183,12 +172,12 @@ def _searched(
 
 def _descended(
     task: Task, second: Dynamics, torques: Array, durations: Array, box: Box, settings: Settings
-) -> list[_Word]:
+) -> list[TorqueWord]:
     """The words made as short as they get, and once more where switches that met have passed each other."""
-    found: list[_Word] = []
+    found: list[TorqueWord] = []
     for _ in range(2):
-        lower = descend(_arcs(task, second, torques, _COARSE).look, box, durations, settings)
-        found += [_tidied(f, s, float(size)) for f, s, size in zip(torques, lower.u, lower.size, strict=True)]
+        lower = descend(arcs_of(task, second, torques, _COARSE).look, box, durations, settings)
+        found += [tidied(f, s, float(size)) for f, s, size in zip(torques, lower.u, lower.size, strict=True)]
         best = np.argsort(lower.cost, kind="stable")[:_PASSED]
         torques, durations = _passed(torques[best], lower.u[best])
         if not len(torques):
@@ -200,7 +189,7 @@ def _passed(torques: Array, durations: Array) -> tuple[Array, Array]:
     """Words in which an inner arc is gone, with its two switches in the other order."""
     words, lengths = [], []
     for f, s in zip(torques, durations, strict=True):
-        gone = np.flatnonzero(s[1:-1] <= _GONE) + 1
+        gone = np.flatnonzero(s[1:-1] <= GONE) + 1
         swapped = f.copy()
         for k in gone:
             here, there = swapped[k] - swapped[k - 1], swapped[k + 1] - swapped[k]
@@ -212,72 +201,19 @@ def _passed(torques: Array, durations: Array) -> tuple[Array, Array]:
     return np.array(words).reshape(-1, *torques.shape[1:]), np.array(lengths).reshape(-1, durations.shape[1])
 
 
-def _sharpened(task: Task, second: Dynamics, word: _Word, longest: float) -> _Word:
+def _sharpened(task: Task, second: Dynamics, word: TorqueWord, longest: float) -> TorqueWord:
     """The word without arcs that are all but gone, as short as it gets on finer steps, and at the goal on the finest."""
     settings = Settings(True, 30, 30, enough=1e-12, relative=1e-10, damping=1e-9)
-    word = _tidied(word.torques, word.durations, word.size, _BRIEF)
-    box = _box(len(word.durations), longest)
-    middle = _arcs(task, second, word.torques[None], _MIDDLE).look
+    word = tidied(word.torques, word.durations, word.size, _BRIEF)
+    box = word_box(len(word.durations), longest)
+    middle = arcs_of(task, second, word.torques[None], _MIDDLE).look
     lower = descend(middle, box, reach(middle, box, word.durations[None], settings).u, settings)
-    fine = reach(_arcs(task, second, word.torques[None], _FINE).look, box, lower.u, settings)
-    return _tidied(word.torques, fine.u[0], float(fine.size[0]))
-
-
-def _words(low: Array, high: Array, lanes: int, switches: int, rng: np.random.Generator) -> Array:
-    """(lanes, K, m) torques: each control starts at one of its bounds and changes to the other one to `switches` times, or is off; all
-    switches in a random order."""
-    m = len(low)
-    arcs = m * switches + 1
-    words = np.empty((lanes, arcs, m))
-    for lane in range(lanes):
-        counts = rng.integers(1, switches + 1, m)
-        off = (rng.random(m) < _OFF) & (low <= 0) & (high >= 0)
-        off &= not np.all(off)
-        counts[off] = 0
-        at_high = rng.random(m) < 0.5
-        order = rng.permutation(np.repeat(np.arange(m), counts))
-        for k in range(arcs):
-            if 0 < k <= len(order):
-                at_high[order[k - 1]] ^= True
-            words[lane, k] = np.where(off, 0.0, np.where(at_high, high, low))
-    return words
-
-
-def _arcs(task: Task, second: Dynamics, torques: Array, steps: int) -> TorqueArcs:
-    group = task.group
-    forces = np.zeros((*torques.shape[:2], group.dim))
-    forces[..., list(task.controls)] = torques
-    eye = np.eye(group.degree)
-    return TorqueArcs(
-        group,
-        Goal(eye, eye, task.target[None]),
-        euler_constants(group, second.inertia),
-        np.linalg.solve(second.inertia, forces[..., None])[..., 0],
-        np.array(second.ends),
-        steps,
-    )
-
-
-def _box(arcs: int, longest: float) -> Box:
-    one = np.ones(arcs)
-    return Box(np.zeros(arcs), np.full(arcs, longest), one, one)
-
-
-def _tidied(torques: Array, durations: Array, size: float, gone: float = _GONE) -> _Word:
-    """Without arcs that are gone, equal neighbours joined."""
-    words: list[Array] = []
-    lengths: list[float] = []
-    for f, s in zip(torques, durations, strict=True):
-        if words and np.array_equal(words[-1], f):
-            lengths[-1] += float(s)
-        elif s > gone:
-            words.append(f)
-            lengths.append(float(s))
-    return _Word(np.array(words), np.array(lengths), float(np.sum(lengths)), size)
+    fine = reach(arcs_of(task, second, word.torques[None], _FINE).look, box, lower.u, settings)
+    return tidied(word.torques, fine.u[0], float(fine.size[0]))
 
 
 def _plan(
-    task: Task, second: Dynamics, word: _Word, details: dict[str, Any], status: Status | None, began: float
+    task: Task, second: Dynamics, word: TorqueWord, details: dict[str, Any], status: Status | None, began: float
 ) -> Plan:
     """The plan of a word, flown by the true system."""
     group, D = task.group, task.duration

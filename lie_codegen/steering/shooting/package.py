@@ -11,7 +11,8 @@ from lie_codegen.algebra.controllability import require_controllable
 from lie_codegen.codegen.opcodes import c_literal
 from lie_codegen.codegen.templates import render
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.body import WeiNormanData, product_exp
+from lie_codegen.groups.wei_norman.body import product_exp
+from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel

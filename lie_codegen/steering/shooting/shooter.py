@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -70,6 +69,8 @@ class Shooter:
         if threads == 1 or len(elements) <= 1:
             only: Extremals = self._machine.solve(elements, w, count)
             return only
+        from concurrent.futures import ThreadPoolExecutor
+
         chunks = np.array_split(elements, min(threads, len(elements)))
         with ThreadPoolExecutor(len(chunks)) as pool:
             parts = list(pool.map(on_behalf(lambda chunk: self._machine.solve(chunk, w, count)), chunks))
