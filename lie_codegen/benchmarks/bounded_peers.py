@@ -1,4 +1,4 @@
-"""What a user would write or install for bounded steering: GRAPE in forty lines, qutip-qtrl, CasADi with ipopt."""
+"""What a user would write or install for bounded steering: GRAPE in forty lines, qutip-qtrl, CasADi with ipopt, crocoddyl."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.bounded_cases import BoundedCase
+from lie_codegen.benchmarks.bounded_crocoddyl import crocoddyl
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.batched_exponential import expm
 
@@ -181,4 +182,5 @@ PEERS: dict[str, Callable[[BoundedCase], Start]] = {
     "GRAPE in forty lines": grape,
     "qutip-qtrl GRAPE": qutip,
     "CasADi + ipopt": ipopt,
+    "crocoddyl, box-FDDP": crocoddyl,
 }

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from lie_codegen.benchmarks import bounded
+from lie_codegen.benchmarks.bounded_cases import bounded_cases
+from lie_codegen.benchmarks.bounded_crocoddyl import crocoddyl
 from lie_codegen.benchmarks.bounded_peers import grape
 
 
@@ -34,7 +38,30 @@ def test_what_falls_short_of_the_goal_is_said() -> None:
     ours = [row("lie_codegen, least energy", 10, 50.0), row("lie_codegen, reach only", 10, 5.0)]
     slower = [row("GRAPE in forty lines", 10, 26.0), row("qutip-qtrl GRAPE", 9, 1.0), row("CasADi + ipopt", 10, 251.0)]
     assert not bounded.missed([*ours, *slower, row("CasADi + ipopt", 0, 0.0, "not installed: casadi")])
+    assert not bounded.missed([ours[0], row("closed form, six words", 10, 0.05)])
+    assert bounded.missed([row("lie_codegen, least time", 9, 1.0), row("closed form, six words", 10, 0.05)])
     quick = bounded.missed([*ours, row("GRAPE in forty lines", 10, 20.0)])
     assert quick == ["a task: GRAPE in forty lines takes 4 times our time, goal 5"]
     assert "missed: a task" in bounded.table(ours, quick)
-    assert "reaches 10" in bounded.missed([row("ours", 9, 1.0), ours[1], row("CasADi + ipopt", 10, 99.0)])[0]
+    assert (
+        "reaches 10"
+        in bounded.missed([row("lie_codegen, least energy", 9, 1.0), ours[1], row("CasADi + ipopt", 10, 99.0)])[0]
+    )
+
+
+def test_cars_are_as_short_as_the_closed_form() -> None:
+    ours, closed = bounded.bench_bounded(targets=2, only="Dubins")
+    assert ours.solved == closed.solved == 2
+    assert ours.cost == pytest.approx(closed.cost, rel=1e-6)
+
+
+def test_box_fddp_reaches_a_gate_within_its_bounds() -> None:
+    pytest.importorskip("crocoddyl")
+    case = bounded_cases(1, 0)[3]
+    u = crocoddyl(case)(case.targets[0], 0)
+    assert u is not None
+    assert np.max(np.abs(u)) <= case.bound
+    X = np.eye(2)
+    for row in u:
+        X = X @ expm(case.duration / case.pieces * case.group.hat(case.drift + row @ case.directions))
+    np.testing.assert_allclose(X, case.targets[0], atol=1e-4)

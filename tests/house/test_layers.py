@@ -39,6 +39,7 @@ ALLOWED = {
     "pinocchio": {"benchmarks"},
     "qutip": {"benchmarks", "steering"},
     "qutip_qtrl": {"benchmarks"},
+    "rsplan": {"benchmarks"},
     "mpmath": {"gallery"},
     "matplotlib": {"pictures", "gallery"},
     "anywidget": {"pictures"},
