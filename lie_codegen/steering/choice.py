@@ -14,6 +14,8 @@ _OPEN = {"cost", "terminal_cost", "constraints", "parameters"}
 _DIRECT = {"equation", "spread", "rounds", "pieces", "iterations", "seed", "polish", "vertices"}
 #: Options with which "auto" is surer by reaching first, and a call by itself soonest answered (decision 23).
 _SURER = {"bounds", "drift"}
+#: Obstacles in space up to which "auto" asks the transcription before the direct method.
+_FEW = 4
 
 
 def asks_open(method: str, options: Mapping[str, Any]) -> bool:
@@ -26,6 +28,12 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
     if method != "auto":
         return method == "direct"
     given = {name for name, value in options.items() if value is not None}
+    if _avoids(options):
+        # a few obstacles are the transcription's first, where it has all that is asked for; it is compiled for their number (decision 24)
+        unusual = bool(given & _DIRECT) or callable(options.get("drift")) or not _plain(controls)
+        return unusual or (
+            _only_direct(given) and len(options["obstacles"]) > _FEW and not _discs(options["obstacles"])
+        )
     if given & _DIRECT or options.get("objective") == "fuel":
         return True
     if options.get("objective") == "time" and "guess" in given:
@@ -34,7 +42,7 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
         return _only_direct(given)  # what it has no option for goes to a method that moves along the set
     if given & {"start", "guess"} and _only_direct(given):
         return True
-    if any(not isinstance(each, str | int | np.integer) for each in controls) or callable(options.get("drift")):
+    if not _plain(controls) or callable(options.get("drift")):
         return True
     if not given & _SURER or not _only_direct(given):
         return False
@@ -42,6 +50,26 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
     if objective == "time" and options.get("vertices") is not None:
         return True
     return objective == "energy" or (objective == "time" and _bounded(options.get("bounds"), controls))
+
+
+def goes_around(method: str, controls: Sequence[Any], options: Mapping[str, Any]) -> bool:
+    """Whether "auto" may ask the direct method where the transcription found no way among obstacles."""
+    given = {name for name, value in options.items() if value is not None}
+    return method == "auto" and _avoids(options) and _only_direct(given) and _plain(controls)
+
+
+def _avoids(options: Mapping[str, Any]) -> bool:
+    """Whether there are obstacles, and the least energy among them is asked for."""
+    obstacles = options.get("obstacles")
+    return isinstance(obstacles, list | tuple) and len(obstacles) > 0 and options.get("objective", "energy") == "energy"
+
+
+def _plain(controls: Sequence[Any]) -> bool:
+    return all(isinstance(each, str | int | np.integer) for each in controls)
+
+
+def _discs(obstacles: Any) -> bool:
+    return all(len(getattr(each, "center", ())) == 2 for each in obstacles)
 
 
 def _only_direct(given: set[str]) -> bool:

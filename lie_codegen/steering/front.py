@@ -10,13 +10,13 @@ from typing import Any, Never
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.errors import SteeringInputError
+from lie_codegen.errors import InfeasibleError, SteeringError, SteeringInputError
 from lie_codegen.flow.elements import admitted_element
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.runtime.patience import shows_progress
-from lie_codegen.steering.choice import asks_direct, asks_open
+from lie_codegen.steering.choice import asks_direct, asks_open, goes_around
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.goal_plans import set_plan
 from lie_codegen.steering.goals import GoalSet
@@ -124,8 +124,8 @@ def steer(
         weights: (m,) positive weights w_i of the cost sum w_i u_i^2; ones.
         objective: "energy" (default), "time" or "fuel" (transcription: not fuel).
         longest: longest duration allowed for "time", in units of `duration`; 20.
-        obstacles: `Cone`s and `Ball`s to keep out of, on all of the way; none (transcription).
-        classes: homotopy classes of ways between discs that are tried; 4 (transcription).
+        obstacles: `Cone`s and `Ball`s to keep out of, on all of the way; none (transcription, direct).
+        classes: classes of ways around them that are tried, which cannot be drawn into each other; 4 (discs: transcription; direct).
         via: (fraction of the duration, element or coordinates) to pass through; none (transcription).
         rest: controls are zero at both ends; False (transcription).
         periodic: controls end as they begin: a gait; False (transcription).
@@ -245,11 +245,34 @@ def steer(
         if value is not None
     }
     check_options(f"steer({group.name})", method, options)
-    plan = _planned(group, target, controls, duration, method, tolerance, options)
+    plan = _found(group, target, controls, duration, method, tolerance, options)
     if isinstance(target, GoalSet) or np.shape(target) != (group.degree, group.degree):
         return plan
     distance = admitted_element(group, target, f"steer({group.name}): target").projected
     return replace(plan, projected=distance) if distance else plan
+
+
+def _found(
+    group: MatrixGroup,
+    target: Any,
+    controls: Sequence[Any],
+    duration: float,
+    method: str,
+    tolerance: float,
+    options: dict[str, Any],
+) -> Plan:
+    """The plan; among obstacles where the transcription finds none, that of the direct method."""
+    given = (group, target, controls, duration)
+    try:
+        return _planned(*given, method, tolerance, options)
+    except SteeringError as error:
+        asked = asks_direct(method, target, controls, options)
+        if asked or isinstance(error, InfeasibleError) or not goes_around(method, controls, options):
+            raise
+        try:
+            return _planned(*given, "direct", tolerance, options)
+        except SteeringError:
+            raise error from None
 
 
 def _planned(

@@ -20,6 +20,10 @@ _IDLE = {
         ("weights", "objective", "rounds", "polish"),
         "beside spread=, whose controls have least squared errors; leave it away",
     ),
+    "obstacles": (
+        ("spread", "pieces", "polish", "vertices", "longest"),
+        "beside obstacles=, around which the controls are linear on 64 pieces; leave it away",
+    ),
 }
 
 

@@ -18,7 +18,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InfeasibleError, ShapeError, SteeringError, SteeringInputError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
-from lie_codegen.steering.constraints import box_limits
+from lie_codegen.steering.constraints import Obstacle, box_limits, check_obstacles
+from lie_codegen.steering.direct.around import around
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces
 from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.compiled import machine
@@ -65,6 +66,8 @@ def direct(
     polish: bool | None = None,
     longest: float = 20.0,
     vertices: ArrayLike | None = None,
+    obstacles: Sequence[Obstacle] | None = None,
+    classes: int = 4,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Least energy, fuel or time within bounds, from many starts.
@@ -89,6 +92,8 @@ def direct(
         polish: whether the controls become continuous (energy); else they stay constant on each piece. Where not given, they do on
             groups of up to 20 dimensions.
         longest: for "time": the longest duration allowed, in units of the given one.
+        obstacles: `Cone`s and `Ball`s to keep out of, "energy" alone.
+        classes: classes of ways around them that are tried.
         vertices: for "time": the (k, m) control vectors that arcs take, where the controls are not free in a box: (omega, v) = (+-1, +-1),
             (0, +-1) is the car of Reeds and Shepp, whose turning rate is bounded by its speed. Box vertices and zeros if not given.
         progress: called with one line a stage.
@@ -103,10 +108,18 @@ def direct(
     began = time.perf_counter()
     _check(objective, equation, starts, rounds, pieces, iterations, tolerance)
     task = manoeuvre(group, target, controls, duration, drift, bounds, weights, start, equation)
+    if obstacles and objective != "energy":
+        raise SteeringInputError(
+            f'steer({group.name}): method="direct" goes around obstacles at least energy; objective={objective!r} beside them is for '
+            "method='transcription' (\"time\") or without them"
+        )
     if objective == "time":
         limits = Settings(True, iterations, iterations)
         return least_time(task, target, tolerance, limits, starts, rounds, seed, longest, say, vertices)
     count = _pieces(task) if pieces is None else pieces
+    if obstacles is not None and len(checked := check_obstacles(group, obstacles)):
+        guesses = guessed(task, guess, count)
+        return around(task, target, checked, classes, tolerance, starts, rounds, iterations, seed, guesses, say)
     if spread is not None:
         guesses = guessed(task, guess, count)
         return robust(task, target, tolerance, spread, starts, count, iterations, seed, guesses, say)

@@ -1,0 +1,208 @@
+"""Stages 1 and 2 among obstacles: controls that reach the goal and stay clear, then cheaper ones that do.
+
+Stage 1 is that of `numpy_search` with rows for the nodes that cut an obstacle, min(0, gap - margin), beside those of the goal. A step
+of stage 2 solves
+
+    min objective(v) + rho/2 |v - u|^2   with   J v = J u - r,   gap + A (v - u) >= margin,   low <= v <= high
+
+by projected Newton steps on its dual, whose unknowns are the goal's n rows and one for each gap in sight; then a few steps of stage 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lie_codegen.arrays import Array
+from lie_codegen.steering.direct.chain import exponentials, flat, linearise, residual
+from lie_codegen.steering.direct.numpy_search import Box, Lanes, Rows, reach
+from lie_codegen.steering.direct.programme import Goal, Programme, Settings
+from lie_codegen.steering.obstacles.keep_out import KeepOut
+
+#: Obstacles of a node that a step looks at, the nearest ones.
+_NEAREST = 2
+_NEWTON, _HALVINGS = 40, 12
+_ROUNDING = 1e-11
+_ARRIVE = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Of controls (L, C): by how much they fail (L,), the goal's reduced rows r (L, n) and J (L, n, C), gaps less margins (L, R) and A (L, R, C)."""
+
+    size: Array
+    r: Array
+    J: Array
+    gap: Array
+    A: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A programme among obstacles.
+
+    Attributes:
+        programme, goal: of one lane each; the goal of one variant.
+        keep_out: the obstacles.
+        start: (d, d) X(0); free motions of the goal are no motions of the system, and are left out of what obstacles see.
+        first: number of the first exponential that is the system's own.
+        nodes: (k,) numbers of own exponentials after which the obstacles are looked at.
+        margins: (o,) gaps that must be kept.
+    """
+
+    programme: Programme
+    goal: Goal
+    keep_out: KeepOut
+    start: Array
+    first: int
+    nodes: Rows
+    margins: Array
+
+    @property
+    def box(self) -> Box:
+        """Limits and weights."""
+        return Box.of(self.programme)
+
+    def states(self, u: Array) -> tuple[Array, Array]:
+        """States (L, K + 1, d, d) along the way, and the matrices eta (L, K, m, d, d) by which u_ki moves all later ones: exp(eta) X."""
+        p = self.programme
+        lanes = len(u)
+        controls = u.reshape(lanes, *p.low.shape)
+        own = slice(self.first, self.first + len(self.own_slots))
+        entry = p.entry[0, own]
+        slot, share = p.slot[own], p.share[own]
+        b = p.directions[entry]
+        after = np.minimum(slot + 1, controls.shape[1] - 1)
+        driven = share[:, :1] * controls[:, slot] + share[:, 1:] * controls[:, after]
+        E, dE = exponentials(
+            p.drifts[entry] + np.einsum("lki,kixy->lkxy", driven, b), np.broadcast_to(b, (lanes, *b.shape))
+        )
+        X = np.empty((lanes, len(entry) + 1, *self.start.shape), E.dtype)
+        X[:, 0] = self.start
+        for k in range(len(entry)):
+            X[:, k + 1] = X[:, k] @ E[:, k]
+        back = np.linalg.inv(X[:, 1:])
+        return X, X[:, :-1, None] @ dE @ back[:, :, None]
+
+    @property
+    def free(self) -> bool:
+        """Whether the goal leaves motions free, which have exponentials of their own."""
+        return len(self.programme.slot) > len(self.own_slots)
+
+    @property
+    def own_slots(self) -> Rows:
+        """The slot of each of the system's own exponentials."""
+        p = self.programme
+        return p.slot[self.first : self.first + self.nodes[-1] + 1]
+
+    def _gaps(self, X: Array, eta: Array) -> tuple[Array, Array]:
+        """Gaps less margins (L, R) of the nearest obstacles at the nodes, and their derivatives (L, R, C)."""
+        lanes, count, m = eta.shape[:3]
+        gap, N = self.keep_out.nearest(np.real(X[:, 1 + self.nodes]), self.margins, _NEAREST)
+        few = gap.shape[2]
+        d2 = N.shape[-1] ** 2
+        A = N.reshape(lanes, -1, d2) @ np.swapaxes(np.real(eta).reshape(lanes, count * m, d2), 1, 2)
+        A = A.reshape(lanes, len(self.nodes), few, count, m)
+        A *= (np.arange(count) <= self.nodes[:, None])[None, :, None, :, None]
+        rows = self.by_slots(A.reshape(lanes, -1, count, m))
+        return gap.reshape(lanes, -1), rows
+
+    def by_slots(self, rows: Array) -> Array:
+        """Derivatives (L, R, K, m) by what drives each own exponential as those by the controls, (L, R, C)."""
+        p, count = self.programme, rows.shape[2]
+        own = slice(self.first, self.first + count)
+        by_slot = np.zeros((count, p.low.shape[0]))
+        by_slot[np.arange(count), p.slot[own]] += p.share[own, 0]
+        ahead = np.minimum(p.slot[own] + 1, p.low.shape[0] - 1)
+        by_slot[np.arange(count), ahead] += p.share[own, 1]
+        found = np.einsum("lrkm,ks->lrsm", rows, by_slot, optimize=True)
+        return np.asarray(found.reshape(*found.shape[:2], -1))
+
+    def known(self, u: Array) -> Known:
+        """What a step needs at controls u (L, C)."""
+        lanes = len(u)
+        X, eta = self.states(u)
+        gap, A = self._gaps(X, eta)
+        goal = replace(self.goal, value=np.repeat(self.goal.value, lanes, axis=0))
+        if self.free:
+            full, r, J = linearise(self.programme, goal, u.reshape(lanes, *self.programme.low.shape))
+        else:
+            full, reduce = residual(self.programme.basis, goal, X[:, -1])
+            moved = goal.left @ eta @ (X[:, -1] @ goal.right)[:, None, None]
+            J = self.by_slots(np.einsum("lnq,lkiq->lnki", reduce, flat(moved)))
+            r = np.einsum("lnq,lq->ln", reduce, full)
+        size = np.sqrt(np.sum(full**2, axis=1) + np.sum(np.minimum(gap, 0.0) ** 2, axis=1))
+        return Known(np.where(np.isfinite(size), size, np.inf), *(np.nan_to_num(each) for each in (r, J, gap, A)))
+
+    def look(self, _: Rows, u: Array) -> Lanes:
+        """The goal's rows and those of the nodes that cut an obstacle, as `numpy_search` asks for them."""
+        at = self.known(u)
+        rows = np.concatenate([at.J, at.A * (at.gap < 0)[:, :, None]], axis=1)
+        return Lanes(u, at.size, np.concatenate([at.r, np.minimum(at.gap, 0.0)], axis=1), rows)
+
+
+def arrive(course: Course, u: Array, settings: Settings) -> tuple[Array, Array]:
+    """Controls (L, C) near u that reach the goal and stay clear, and by how much they fail to (L,)."""
+    found = reach(course.look, course.box, u, settings)
+    return found.u, found.size
+
+
+def cheaper(course: Course, u: Array, settings: Settings) -> tuple[Array, float, int]:
+    """Controls (C,) that reach the goal and stay clear as u does, at less cost; the cost, and steps taken."""
+    box, enough = course.box, 100 * settings.enough
+    best = float(box.objective(False, u[None])[0])
+    at = course.known(u[None])
+    rho, quiet, steps = 1.0, 0, 0
+    restoring = Settings(reach_iterations=_ARRIVE, enough=settings.enough, damping=1e-9)
+    while steps < settings.descend_iterations and quiet < 3 and rho < 1e5:
+        steps += 1
+        v = _proximal(box, u, at.r[0], at.J[0], at.gap[0], at.A[0], rho)
+        trial, off = arrive(course, v[None], restoring)
+        cost = float(box.objective(False, trial)[0])
+        if off[0] < enough and cost < best:
+            quiet = quiet + 1 if best - cost <= settings.relative * best else 0
+            u, best = trial[0], cost
+            at = course.known(trial)
+            rho = max(rho / 3, 1e-6)
+        else:
+            rho *= 4
+    return u, best, steps
+
+
+def _proximal(box: Box, u: Array, r: Array, J: Array, gap: Array, A: Array, rho: float) -> Array:
+    """The step's controls: the dual is concave with a continuous gradient; z >= 0 belongs to the gaps."""
+    n = len(r)
+    mass = box.mass
+    G = np.concatenate([J, A])
+    want = np.concatenate([J @ u - r, A @ u - gap])
+    rate = 1 / (box.weight + rho)
+    limit = np.concatenate([np.full(n, -np.inf), np.zeros(len(gap))])
+
+    def primal(y: Array) -> tuple[Array, Array, float, Array]:
+        v = np.clip((G.T @ y / mass + rho * u) * rate, box.low, box.high)
+        g = want - G @ v
+        value = 0.5 * float(mass @ (box.weight * v * v + rho * (v - u) ** 2)) + float(y @ g)
+        inside = np.where((v > box.low) & (v < box.high), rate, 0.0)
+        return v, g, value, inside
+
+    y = np.zeros(len(want))
+    v, g, value, inside = primal(y)
+    for _ in range(_NEWTON):
+        free = (y > limit) | (g > 0)
+        if float(np.max(np.abs(np.where(free, g, 0.0)))) <= _ROUNDING:
+            break
+        H = (G[free] * (inside / mass)) @ G[free].T
+        H += (1e-9 * np.trace(H) / max(len(H), 1) + 1e-14) * np.eye(len(H))
+        step = np.zeros(len(y))
+        step[free] = np.linalg.solve(H, g[free])
+        for half in range(_HALVINGS):
+            trial = np.maximum(y + 0.5**half * step, limit)
+            found = primal(trial)
+            if found[2] > value + 1e-4 * float(g @ (trial - y)):
+                break
+        else:
+            break
+        y = trial
+        v, g, value, inside = found
+    return v
