@@ -133,9 +133,9 @@ def test_a_hole_in_a_wall_of_balls_is_flown_through() -> None:
 def test_scenes_that_random_controls_have_passed_are_passed(seed: int) -> None:
     rng = np.random.default_rng(seed)
     if seed % 2:
-        group, controls = lc.group("se3"), ("w1", "w2", "w3", "v1")
+        group, controls = lc.group("se3"), ["w1", "w2", "w3", "v1"]
     else:
-        group, controls = lc.group("so3"), ("w1", "w2")
+        group, controls = lc.group("so3"), ["w1", "w2"]
     places = [group.labels.index(label) for label in controls]
     X, states = np.eye(group.degree), []
     mean = rng.uniform(-1, 1, len(controls))
