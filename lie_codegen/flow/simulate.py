@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,12 +29,20 @@ METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)
 _DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
+@runtime_checkable
+class Simulated(Protocol):
+    """What knows its own system, as a plan does."""
+
+    def __simulate__(self, group: MatrixGroup | None, **options: Any) -> Trajectory:
+        """The run of it; `group` and the options are those given to `simulate`."""
+
+
 @shows_progress
 def simulate(
-    group: GroupLike,
-    u: Any,
+    group: GroupLike | Simulated,
+    u: Any = None,
     *,
-    t: ArrayLike,
+    t: ArrayLike | None = None,
     eps: ArrayLike = 1.0,
     X0: ArrayLike | None = None,
     rtol: float | None = None,
@@ -53,14 +61,15 @@ def simulate(
     side by side; many go eight at a time.
 
     Args:
-        group: the group.
-        u: a PeriodicInput or a SampledInput (evaluated in the compiled loop where it is a Fourier series or straight
+        group: the group; or a plan alone, as in `lc.simulate(plan)`.
+        u: a plan of `lc.steer`, which is flown on its own system: with its drift, equation and start, torques with their inertia
+            (`run.xi`); else a PeriodicInput or a SampledInput (evaluated in the compiled loop where it is a Fourier series or straight
             pieces, however long the run); a constant (n,); samples (len(t), n), joined by straight lines; a text for each
             component, a formula of t; or any u(t) -> (n,) (vectorised or not; an attribute `breakpoints` names the times at
             which it is not smooth), which is read once, finely enough to be known between the values (see `resolution`).
-        t: (k,) increasing times; the first is the initial one.
+        t: (k,) increasing times; the first is the initial one. A plan has 101 equal ones from 0 to its duration if not given.
         eps: scales u; (N,) for N trajectories.
-        X0: (d, d) initial element, the identity if not given; (N, d, d) for N trajectories.
+        X0: (d, d) initial element, the identity if not given (of a plan where it is at t[0]); (N, d, d) for N trajectories.
         rtol: the steps are made shorter until the estimated error of the entries of X is below rtol max(1, |X|); 1e-11 if
             nothing is given, at least 1e-14.
         atol: the error may also be that large, whatever X is.
@@ -79,8 +88,20 @@ def simulate(
         NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
         ComputationError: the tolerance is not reached with the steps that can be taken: 67 million; or u(t) is not resolved.
     """
+    options = {
+        "t": t, "eps": eps, "X0": X0, "rtol": rtol, "atol": atol, "tolerance": tolerance, "resolution": resolution,
+        "method": method, "steps": steps, "events": events, "threads": threads,
+    }  # fmt: skip
+    if isinstance(group, Simulated):
+        if u is not None:
+            raise InputError("simulate: a plan comes alone, or after its group")
+        return group.__simulate__(None, **options)
     group = as_group(group, "simulate")
-    times = _check_times(group, t)
+    if isinstance(u, Simulated):
+        return u.__simulate__(group, **options)
+    if u is None or t is None:
+        raise InputError(f"simulate({group.name}): give {'an input u' if u is None else 'the times t'}")
+    times = check_times(group, t)
     factors = _factors(group, eps)
     goal = check_tolerance(f"simulate({group.name})", rtol, atol, tolerance)
     if method not in METHODS:
@@ -89,7 +110,7 @@ def simulate(
         raise InputError(
             f"simulate({group.name}): atol goes with steps that are chosen by it; give steps or atol, not both"
         )
-    start = _initial(group, X0)
+    start = initial_elements(group, X0)
     law = as_feedback(group, u)
     if law is not None:
         return _feedback_run(group, law, times, factors, start, goal, atol, method, steps, events, resolution, threads)
@@ -233,7 +254,12 @@ def _check_trajectories(group: MatrixGroup, start: Array, eps: Array, u: Signal)
         raise ShapeError(f"simulate({group.name}): give one number of trajectories; {text}")
 
 
-def _check_times(group: MatrixGroup, t: ArrayLike) -> Array:
+def check_times(group: MatrixGroup, t: ArrayLike) -> Array:
+    """(k,) increasing times.
+
+    Raises:
+        InputError, ShapeError, NotFiniteError: they are none.
+    """
     try:
         times = np.asarray(t, dtype=float)
     except (TypeError, ValueError):
@@ -247,7 +273,12 @@ def _check_times(group: MatrixGroup, t: ArrayLike) -> Array:
     return times
 
 
-def _initial(group: MatrixGroup, X0: ArrayLike | None) -> Array:
+def initial_elements(group: MatrixGroup, X0: ArrayLike | None) -> Array:
+    """X0, the identity if not given, as an element of the group, or (N, d, d) of them.
+
+    Raises:
+        ShapeError, NotFiniteError, NotOnGroupError: it is none.
+    """
     kind = complex if group.is_complex else float
     d = group.degree
     if X0 is None:

@@ -1,4 +1,4 @@
-"""X' = X hat(xi), J xi' = ad*_xi J xi - D xi + f(t) from rest, by an explicit method of order 8 on the entries of X."""
+"""X' = X hat(xi), J xi' = ad*_xi J xi - D xi + f(t) by an explicit method of order 8 on the entries of X."""
 
 from __future__ import annotations
 
@@ -13,10 +13,16 @@ from lie_codegen.errors import ComputationError
 from lie_codegen.groups.matrix_group import MatrixGroup
 
 
-def damped_end(
-    group: MatrixGroup, force: Callable[[float], Array], inertia: Array, damping: Array, duration: float
-) -> tuple[Array, Array]:
-    """X and xi at the end.
+def damped_run(
+    group: MatrixGroup,
+    force: Callable[[float], Array],
+    inertia: Array,
+    damping: Array,
+    t: Array,
+    xi0: Array,
+    tolerance: float,
+) -> tuple[Array, Array, float, int]:
+    """X and xi at increasing times, from X = I and xi0 at the first of them; a bound of the error, and the steps taken.
 
     Raises:
         ComputationError: the integration fails.
@@ -32,11 +38,22 @@ def damped_end(
         total = ad_star(group.algebra, xi, inertia @ xi) - damping @ xi + force(t)
         return np.concatenate([(X @ group.hat(xi)).ravel(), inverse @ total])
 
-    y = np.concatenate([np.eye(d, dtype=kind).ravel(), np.zeros(group.dim)])
+    y = np.concatenate([np.eye(d, dtype=kind).ravel(), xi0])
     inner = np.asarray(getattr(force, "breakpoints", ()), dtype=float)
-    for a, b in pairwise(np.unique(np.concatenate([[0.0], inner, [duration]]))):
-        run = solve_ivp(rate, (a, b), y, method="DOP853", rtol=1e-10, atol=1e-12)
+    stops = np.unique(np.concatenate([t, inner[(inner > t[0]) & (inner < t[-1])]]))
+    path, steps = [y], 0
+    for a, b in pairwise(stops):
+        run = solve_ivp(rate, (a, b), y, method="DOP853", rtol=tolerance, atol=tolerance / 100)
         if not run.success:
-            raise ComputationError(f"the integration failed: {run.message}")
-        y = run.y[:, -1]
-    return y[:size].reshape(d, d), y[size:].real
+            raise ComputationError(f"simulate_driven({group.name}): the integration failed: {run.message}")
+        y, steps = run.y[:, -1], steps + len(run.t) - 1
+        path.append(y)
+    rows = np.array(path)[np.searchsorted(stops, t)]
+    # the method's own tolerance is one of each step
+    X = rows[:, :size].reshape(len(t), d, d)
+    return (
+        X,
+        np.ascontiguousarray(rows[:, size:].real),
+        tolerance * max(1.0, float(np.max(np.abs(rows)))) * steps,
+        steps,
+    )

@@ -17,6 +17,7 @@ from lie_codegen.flow.rollout import BLOCK
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.mechanics.damped_run import damped_run
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.call import Compiled
@@ -38,12 +39,14 @@ class Driven(Saved):
         X: (k, d, d) configurations.
         xi: (k, n) body velocities.
         error_estimate: difference to the run with half the steps, over 15 (Richardson).
+        steps: that were taken.
     """
 
     t: Array
     X: Array
     xi: Array
     error_estimate: float
+    steps: int = 0
 
 
 @lru_cache(maxsize=32)
@@ -64,8 +67,9 @@ def simulate_driven(
     t: ArrayLike,
     xi0: ArrayLike | None = None,
     tolerance: float = 1e-11,
+    damping: ArrayLike | None = None,
 ) -> Driven:
-    """The motion under a body force given in time, from X = I at t[0].
+    """The motion under a body force given in time, and a drag -D xi if there is one, from X = I at t[0].
 
     Args:
         group: the group.
@@ -73,7 +77,8 @@ def simulate_driven(
         inertia: (n, n) symmetric positive definite.
         t: (k,) increasing times.
         xi0: (n,) initial body velocity, zero if not given.
-        tolerance: on the entries of X and xi, relative to the largest one or 1.
+        tolerance: on the entries of X and xi, relative to the largest one or 1; of each step where there is a drag.
+        damping: (n, n) D; none if not given. With it an explicit method of order 8 runs in Python.
 
     Raises:
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
@@ -83,6 +88,9 @@ def simulate_driven(
     signal = as_signal(group, force, times)
     start = initial_states(group, None, xi0)[0][0]
     J = np.ascontiguousarray(inertia, dtype=float)
+    if damping is not None and np.any(damping):
+        D = np.asarray(damping, dtype=float)
+        return Driven(times, *damped_run(group, force, J, D, times, start[-group.dim :], tolerance))
     inverse = np.ascontiguousarray(np.linalg.inv(J))
     step = _library(group).driven_step
     grid, coarse = Grid.coarse(times, signal.breakpoints), None
@@ -92,7 +100,7 @@ def simulate_driven(
             estimate = float(np.max(np.abs(states - coarse))) / 15
             scale = max(1.0, float(np.max(np.abs(states))))
             if move <= _LARGEST_MOVE and estimate <= max(tolerance * scale, 4e-16 * scale * np.sqrt(grid.steps)):
-                return Driven(times, *split_states(group, states), estimate)
+                return Driven(times, *split_states(group, states), estimate, grid.steps)
         if 2 * grid.steps > _MOST_STEPS and not np.isfinite(move):
             raise ComputationError(f"simulate_driven({group.name}): the solution left the range of double precision")
         coarse = states if np.isfinite(move) else None

@@ -268,6 +268,10 @@ class Plan(Saved):
         found: Array = path[place[: times.size]].reshape(*times.shape, *path.shape[1:])
         return found
 
+    def __simulate__(self, group: MatrixGroup | None, **options: Any) -> Any:
+        """`lc.simulate` of this plan."""
+        return import_module(PATH).simulated(self, group, **options)
+
     def to_csv(self, path: str | Path | None = None, *, t: ArrayLike | None = None) -> str:
         """The controls as a table: t and one column a component; at 101 equal times if `t` is not given. Written where a path is
         given; returned as a text in any case."""

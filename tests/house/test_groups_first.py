@@ -29,7 +29,7 @@ ABOUT_ANOTHER_THING = {
 OTHERS_FIRST = ("closed_loop", "gradient", "loop_margins", "read_law", "widget")
 NAME = "sl2"
 #: One of several ways to say the rest must be taken.
-NEEDS_MORE = ("certificate", "observer", "reference")
+NEEDS_MORE = ("certificate", "observer", "reference", "simulate")
 
 
 def parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:

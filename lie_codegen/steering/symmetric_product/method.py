@@ -214,6 +214,7 @@ def _plan(
         **details,
         "dynamics": "second_order",
         "inertia": body.inertia,
+        **({"damping": body.damping} if np.any(body.damping) else {}),
         "end_velocity_error": speed / duration,
         "decoupling": tuple(body.names[a] for a in body.decoupling),
         "inputs": Inputs(law),
@@ -230,12 +231,8 @@ def _plan(
 
 def _flown(body: VirtualActuation, u: Controls, duration: float) -> tuple[Array, Array]:
     """Where the torques really lead, by an integrator that knows nothing of averages: the drag of the body is a force too."""
-    if not np.any(body.damping):
-        run = simulate_driven(body.group, u, body.inertia, t=[0.0, duration], tolerance=1e-10)
-        return run.X[-1], run.xi[-1]
-    from lie_codegen.mechanics.damped_run import damped_end
-
-    return damped_end(body.group, u, body.inertia, body.damping, duration)
+    run = simulate_driven(body.group, u, body.inertia, t=[0.0, duration], tolerance=1e-10, damping=body.damping)
+    return run.X[-1], run.xi[-1]
 
 
 def _compared(body: VirtualActuation, target: Array, duration: float) -> float:
