@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from lie_codegen.control.attitude import gyroscopic_factor
-from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number, real_number
+from lie_codegen.control.attitude_ports import (
+    ATTITUDE,
+    BODY,
+    DESIRED,
+    RATE,
+    attitude_gain,
+    body_inertia_parameter,
+    random_reference,
+    random_rotation,
+    units_of_gains,
+)
+from lie_codegen.control.reduced_attitude_law import reduced_law
+from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.derivation import GroupDerivation
-from lie_codegen.groups.maps.admission import NEAR_GROUP
 from lie_codegen.groups.maps.exponential import jacobian
-from lie_codegen.groups.maps.guard import kept_where, nan_off_group
-from lie_codegen.groups.maps.rotation_log import half_angle_ratio, rotation_log
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.groups.maps.guard import nan_off_group
+from lie_codegen.groups.maps.rotation_log import rotation_log
+from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
-from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import (
     Matrix,
@@ -30,33 +36,16 @@ from lie_codegen.kernel.linear import (
     matmul,
     matvec,
     minus,
-    number,
     plus,
     scaled,
     transpose,
 )
-from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
-from lie_codegen.on_demand import sympy as sp
+from lie_codegen.kernel.parameter import Parameter, input_ports, sample_inputs, values_of
 
 _KINDS = ("p", "pd", "reduced")
-_ATTITUDE = Port("X", (3, 3), description="attitude error: body to reference, R_d' R")
-_BODY = Port("X", (3, 3), description="attitude, body to inertial")
-_RATE = Port("omega", (3,), "rad/s", description="body angular velocity")
-_DESIRED = (
-    Port("X_d", (3, 3), description="desired attitude"),
-    Port("xi_d", (3,), "rad/s", description="its body velocity, X_d' = X_d hat(xi_d)"),
-    Port("xi_d_dot", (3,), "rad/s^2", description="the rate of that"),
-)
 
 
-def _units(parameters: Mapping[str, Any]) -> Mapping[str, str]:
-    """Of the gains: the kinds that command a velocity, and the one that commands a torque."""
-    if parameters.get("kind", "pd") != "pd":
-        return {"k_p": "1/s"}
-    return {"inertia": "kg m^2", "k_p": "N m/rad", "k_d": "N m s/rad"}
-
-
-@kernel_factory(units=_units)
+@kernel_factory(units=units_of_gains)
 def attitude_law(
     kind: str = "p",
     *,
@@ -110,30 +99,20 @@ def attitude_law(
         law = replace(_proportional_derivative(parameters, gyroscopic, tracking), name=name or "attitude_pd")
         return nan_off_group(law, group("so3"), ports)
     if inertia is not None:
-        _inertia(inertia, False)
+        body_inertia_parameter(inertia, False)
     if k_d is not None:
-        _gain(Port("k_d", ()), k_d, False)
+        attitude_gain(Port("k_d", ()), k_d, False)
     gyroscopic_factor(gyroscopic)
-    gain = _gain(Port("k_p", (), "1/s", description="gain"), k_p, tunable)
+    gain = attitude_gain(Port("k_p", (), "1/s", description="gain"), k_p, tunable)
     if kind == "reduced":
         if tracking or gain.port.shape:
             raise InputError(
                 "the attitude law 'reduced' has a number k_p and no tracking form; a loop gives it X_d' X instead"
             )
-        made = _reduced(gain, z)
+        made = reduced_law(gain, z)
     else:
         made = nan_off_group(_proportional(gain, tracking), group("so3"), ports)
     return replace(made, name=name or made.name)
-
-
-def _gain(port: Port, value: Any, tunable: bool) -> Parameter:
-    """A positive number; or, given as one, a diagonal or a symmetric positive definite matrix."""
-    listed = not isinstance(value, str) and (isinstance(value, Sequence) or hasattr(value, "shape"))
-    if listed and np.ndim(value):
-        return parameter(
-            replace(port, shape=(3, 3)), value, lambda given, what: positive_matrix(given, 3, what), tunable=tunable
-        )
-    return parameter(port, value, positive_number, tunable=tunable)
 
 
 def _times(gain: Any, vector: Vector) -> Vector:
@@ -141,19 +120,14 @@ def _times(gain: Any, vector: Vector) -> Vector:
     return matvec(gain, vector) if isinstance(gain, list) else scaled(gain, vector)
 
 
-def _inertia(value: Any, tunable: bool) -> Parameter:
-    port = Port("inertia", (3, 3), "kg m^2", description="inertia of the body, symmetric")
-    return parameter(port, value, body_inertia, tunable=tunable)
-
-
 def _parameters(inertia: Any, k_p: Any, k_d: Any, tunable: bool) -> tuple[Parameter, ...]:
     """Of a law that commands a torque."""
     stiffness = Port("k_p", (), "N m/rad", description="stiffness")
     damping = Port("k_d", (), "N m s/rad", description="damping")
     return (
-        _inertia(inertia, tunable),
-        _gain(stiffness, k_p, tunable),
-        _gain(damping, k_d, tunable),
+        body_inertia_parameter(inertia, tunable),
+        attitude_gain(stiffness, k_p, tunable),
+        attitude_gain(damping, k_d, tunable),
     )
 
 
@@ -177,7 +151,7 @@ def _proportional(k_p: Parameter, tracking: bool) -> Kernel:
     return Kernel(
         name="attitude_p",
         namespace="so3",
-        inputs=(*((_BODY, *_DESIRED[:2]) if tracking else (_ATTITUDE,)), *input_ports([k_p])),
+        inputs=(*((BODY, *DESIRED[:2]) if tracking else (ATTITUDE,)), *input_ports([k_p])),
         outputs=(
             Port("omega", (3,), "rad/s", description="commanded body angular velocity"),
             Port("V", (), "rad^2", description="|theta|^2/2"),
@@ -186,7 +160,7 @@ def _proportional(k_p: Parameter, tracking: bool) -> Kernel:
         body=body,
         formula="omega = -k_p log R; R(t) = exp(e^{-k_p t} log R(0))" + moving,
         source="Geyer, The Attitude Control Problem, (17) with omega where omega' is printed",
-        sampler=lambda rng: (_rotation(rng), *_desired(rng)[: 2 * tracking], *sample_inputs([k_p], rng)),
+        sampler=lambda rng: (random_rotation(rng), *random_reference(rng)[: 2 * tracking], *sample_inputs([k_p], rng)),
     )
 
 
@@ -219,7 +193,7 @@ def _proportional_derivative(parameters: Sequence[Parameter], gyroscopic: str, t
     return Kernel(
         name="attitude_pd",
         namespace="so3",
-        inputs=(*((_BODY, _RATE, *_DESIRED) if tracking else (_ATTITUDE, _RATE)), *input_ports(parameters)),
+        inputs=(*((BODY, RATE, *DESIRED) if tracking else (ATTITUDE, RATE)), *input_ports(parameters)),
         outputs=(
             Port("torque", (3,), "N m", description="body torque tau of I omega' = -omega x I omega + tau"),
             Port("V", (), "J", description=f"theta' k_p theta/2 + {rate}' I {rate}/2"),
@@ -229,130 +203,9 @@ def _proportional_derivative(parameters: Sequence[Parameter], gyroscopic: str, t
         formula=f"tau = {factor} {rate} x I omega - k_p log R - k_d {rate}{forward}",
         source="Geyer, The Attitude Control Problem, (18); the printed sign of omega x I omega goes with the printed (3)",
         sampler=lambda rng: (
-            _rotation(rng),
+            random_rotation(rng),
             [rng.uniform(-1, 1) for _ in range(3)],
-            *_desired(rng)[: 3 * tracking],
+            *random_reference(rng)[: 3 * tracking],
             *sample_inputs(parameters, rng),
         ),
     )
-
-
-def _desired(rng: random.Random) -> tuple[Any, ...]:
-    """X_d, xi_d, xi_d_dot."""
-    return _rotation(rng), *([rng.uniform(-1, 1) for _ in range(3)] for _ in range(2))
-
-
-def _reduced(k_p: Parameter, z: Sequence[Any]) -> Kernel:
-    if len(z) != 3:
-        raise ShapeError(f"z has {len(z)} entries; give the three of an inertial direction")
-    exact = [real_number(entry, f"z[{i}]") for i, entry in enumerate(z)]
-    length = sp.sqrt(sum(entry**2 for entry in exact))
-    if length == 0:
-        raise InputError("z is zero; give the inertial direction that the sensor sees")
-    unit = [entry / length for entry in exact]
-
-    def body(ops: Arithmetic, y: Vector, *given: Any) -> tuple[Any, ...]:
-        axis = [number(ops, entry) for entry in unit]
-        of_unit_length = ops.less(ops.fabs(dot(y, y) - 1), ops.constant(2 * NEAR_GROUP))
-        normal, cosine = cross(axis, y), dot(axis, y)
-        ratio = _angle_over_sine(ops, dot(normal, normal), cosine)
-        error, [gain] = scaled(ratio, normal), values_of(ops, [k_p], given)
-        square = dot(error, error)
-        values = (scaled(gain, error), square / 2, -gain * square)
-        return tuple(kept_where(ops, [of_unit_length], value) for value in values)
-
-    return Kernel(
-        name="attitude_reduced",
-        namespace="so3",
-        inputs=(
-            Port("y", (3,), description="measured direction R' z in the body frame, of unit length"),
-            *input_ports([k_p]),
-        ),
-        outputs=(
-            Port("omega", (3,), "rad/s", description="commanded body angular velocity"),
-            Port("V", (), "rad^2", description="alpha^2/2, alpha the angle from y to z"),
-            Port("V_dot", (), "rad^2/s", description="-k_p alpha^2"),
-        ),
-        body=body,
-        formula="omega = k_p alpha (z x y)/|z x y|; alpha(t) = alpha(0) e^{-k_p t}; singular at y = -z alone",
-        source="Geyer, The Attitude Control Problem, Proposition 22, for y = R' z",
-        sampler=lambda rng: ([row[2] for row in _rotation(rng)], *sample_inputs([k_p], rng)),
-    )
-
-
-def _angle_over_sine(ops: Arithmetic, sine_squared: Scalar, cosine: Scalar) -> Scalar:
-    """alpha/sin alpha for alpha in [0, pi), by the half angle: alpha = 2 atan2(sin alpha, 1 + cos alpha).
-
-    At alpha = pi the direction is lost: the value there is 0, the law commands nothing, and any disturbance leaves
-    that set.
-    """
-    away = ops.less(-1 + _ANTIPODE, cosine)
-    safe = ops.where(away, 1 + cosine, 1)
-    tangent_squared = ops.where(away, sine_squared, 0) / (safe * safe)
-    return ops.where(away, half_angle_ratio(ops, 1, tangent_squared) / safe, 0)
-
-
-#: Distance of the cosine from -1 below which the antipode is treated as reached.
-_ANTIPODE = 1e-14
-
-
-@kernel_factory(units=_units)
-def attitude_lyapunov(
-    *, inertia: Any, k_p: Any, k_d: Any, epsilon: Any, gyroscopic: str = "none", name: str = "attitude_lyapunov"
-) -> Kernel:
-    """The strict Lyapunov function of Proposition 21 and its rate: (X, omega) -> (V, V_dot); each number may be "input".
-
-        V = k_p |theta|^2/2 + omega' I omega/2 + epsilon theta' I omega
-
-    V_dot is the derivative along the closed loop, by a dual number through the logarithm itself, so that it holds for
-    every gyroscopic term; for epsilon below `cross_term_bound` it is negative for gyroscopic "none" and |theta| < pi.
-
-    Raises:
-        InputError: as `attitude_law`.
-    """
-    parameters = (
-        _inertia(inertia, False),
-        parameter(Port("k_p", (), "N m/rad"), k_p, positive_number),
-        parameter(Port("k_d", (), "N m s/rad"), k_d, positive_number),
-        parameter(Port("epsilon", (), "1/s", description="of the cross term"), epsilon, positive_number),
-    )
-    c = gyroscopic_factor(gyroscopic) - 1
-
-    def body(ops: Arithmetic, X: Matrix, omega: Vector, *given: Any) -> tuple[Any, ...]:
-        metric, p, d, e = values_of(ops, parameters, given)
-        dual = DualArithmetic(ops)
-        wx = [[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]]
-        rate = matmul(X, wx)
-        moving = [[dual.variable(X[i][j], {0: rate[i][j]}) for j in range(3)] for i in range(3)]
-        logarithm = rotation_log(dual, moving)
-        theta = [value_of(entry, dual.level) for entry in logarithm]
-        theta_dot = [tangent_of(entry, 0, dual.level) for entry in logarithm]
-        momentum = matvec(metric, omega)
-        action = plus(scaled(p, theta), scaled(d, omega))
-        force = minus(scaled(c, cross(omega, momentum)), action)
-        V = (p * dot(theta, theta) + dot(omega, momentum)) / 2 + e * dot(theta, momentum)
-        crossing = dot(theta_dot, momentum) + dot(theta, force)
-        return V, -d * dot(omega, omega) + e * crossing
-
-    return Kernel(
-        name=name,
-        namespace="so3",
-        inputs=(_ATTITUDE, _RATE, *input_ports(parameters)),
-        outputs=(Port("V", (), "J"), Port("V_dot", (), "W")),
-        body=body,
-        formula="V = k_p |theta|^2/2 + omega' I omega/2 + epsilon theta' I omega, and dV/dt along the closed loop",
-        source="Geyer, The Attitude Control Problem, proof of Proposition 21",
-        sampler=lambda rng: (_rotation(rng), [rng.uniform(-1, 1) for _ in range(3)], *sample_inputs(parameters, rng)),
-    )
-
-
-def _rotation(rng: random.Random) -> list[list[float]]:
-    """A rotation by a random unit quaternion."""
-    q = np.array([rng.gauss(0, 1) for _ in range(4)])
-    a, b, c, d = q / np.linalg.norm(q)
-    R = [
-        [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-        [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-        [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
-    ]
-    return [[float(entry) for entry in row] for row in R]

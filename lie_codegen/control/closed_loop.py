@@ -9,22 +9,20 @@ from typing import Any, Literal, Never, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.arrays import Array
 from lie_codegen.control.curve_reference import CurveReference, check_curve
 from lie_codegen.control.disturbance import ForceBody
 from lie_codegen.control.loop_adaptive import adaptive, by_gauss, loop_events, loop_system
-from lie_codegen.control.loop_arguments import LoopArguments, loop_arguments
+from lie_codegen.control.loop_arguments import loop_arguments
 from lie_codegen.control.loop_library import loop_library, loop_numbers, several
-from lie_codegen.control.loop_origin import LoopMaking, loop_origin, narrower, run_in_steps
+from lie_codegen.control.loop_origin import narrower, run_in_steps
+from lie_codegen.control.loop_readout import result_of
 from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.control.loop_run import Run, noise_stream, refined
-from lie_codegen.control.loop_states import initial_own, own_states
+from lie_codegen.control.loop_states import initial_own
 from lie_codegen.control.reference_check import check_once
 from lie_codegen.errors import InputError
-from lie_codegen.flow.events import Event, EventHits
-from lie_codegen.flow.pair853 import PairRun
+from lie_codegen.flow.events import Event
 from lie_codegen.identifiers import shown, unknown_keywords
-from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.patience import shows_progress
 
 
@@ -250,21 +248,21 @@ def closed_loop(
         if events:
             raise InputError("closed_loop: events go with rtol, not with method='gauss'")
         equal = run_in_steps(run, told.model, told.reference)
-        return _result(equal, told, by_gauss(run, told.parts), told.parts, float("nan"))
+        return result_of(equal, told, by_gauss(run, told.parts), told.parts, float("nan"))
     if events and (told.step is not None or "loop_rate" not in library.kernels or not loop_system(run).compiled):
         raise InputError(
             "closed_loop: events are of a law that acts continuously on a group, with rtol; not with step or sample"
         )
     if told.step is not None:
-        return _result(run, told, run.states(told.parts), told.parts, float("nan"))
+        return result_of(run, told, run.states(told.parts), told.parts, float("nan"))
     if "loop_rate" in library.kernels:
         if loop_system(run).compiled:
             found, pair = adaptive(run, told.rtol)
             hits = loop_events(run, pair, events) if events else ()
-            return _result(run, told, found, 0, pair.error_estimate, pair, hits)
+            return result_of(run, told, found, 0, pair.error_estimate, pair, hits)
         run = run_in_steps(run, told.model, told.reference)
     found, count, error = refined(run, told.rtol, narrower)
-    return _result(run, told, found, count, error)
+    return result_of(run, told, found, count, error)
 
 
 def _whole(value: Any, name: str, default: int) -> int:
@@ -273,65 +271,3 @@ def _whole(value: Any, name: str, default: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
         raise InputError(f"closed_loop: {name} is a whole number, not negative; given {shown(value)}")
     return int(value)
-
-
-def _result(
-    run: Run,
-    told: LoopArguments,
-    found: Array,
-    count: int,
-    error: float,
-    pair: PairRun | None = None,
-    events: tuple[EventHits, ...] = (),
-) -> ClosedLoop:
-    loop, times = run.loop, run.times
-    X, xi = loop.plant.split(found)
-    states = own_states(loop, found, sampled=bool(run.sample))
-    outputs, u, moves = _outputs(run, found)
-    if run.sample and loop.law is not None:
-        u = np.ascontiguousarray(found[..., -loop.plant.sizes[2] :])
-    if loop.plant.order == 1 and u is not None:
-        xi = u
-    gap = run.sample or float(times[1] - times[0])
-    steps = pair.steps if pair is not None else count * round((times[-1] - times[0]) / gap)
-    group = getattr(loop.plant, "group", None)
-    shared = {name: value for name, value in states.items() if name not in outputs}
-    making = LoopMaking(run, told.model, told.reference, told.rtol, count, pair)
-    return ClosedLoop(
-        times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group, events,
-        loop_origin(making, told.kind if pair is None else "adaptive"),
-    )._made_by(making)  # fmt: skip
-
-
-def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
-    """What the law gives at the times, its command within the limits, and the reference."""
-    loop, times = run.loop, run.times
-    moves = run.reference(times)
-    if loop.law is None:
-        return {}, None, moves
-    inner = loop.extent(sampled=False)
-    states = found[..., :inner]
-    if run.sample:  # the own states as the law used them stand behind those that it will use next
-        place = sum(loop.plant.sizes[:2])
-        own = inner - place
-        states = np.concatenate([found[..., :place], found[..., place + own : place + 2 * own]], axis=-1)
-    shape = states.shape[:-1]
-    repeats = shape[1] if run.many else 1
-    kernel = run.library.loop_outputs
-    given: dict[str, Any] = {"t": np.repeat(times, repeats), "h": run.sample}
-    given |= {name: np.repeat(value, repeats, axis=0) if run.many else value for name, value in moves.items()}
-    given |= {
-        port.name: _repeated(port, run.numbers[port.name], len(times))
-        for port in kernel.inputs
-        if port.name in run.numbers
-    }
-    names = [port.name for port in kernel.inputs[1:]]
-    flat = np.ascontiguousarray(states.reshape(-1, inner))
-    made = kernel.batch(flat, **{name: given[name] for name in names}, threads=run.threads)
-    values = {port.name: v.reshape(*shape, *v.shape[1:]) for port, v in zip(kernel.outputs, made, strict=True)}
-    return values, values.pop(kernel.outputs[-1].name), moves
-
-
-def _repeated(port: Port, values: Array, times: int) -> Array:
-    """One a sample of all loops at all times, where there is one a loop."""
-    return values if values.ndim == len(port.shape) else np.tile(values, (times, *[1] * len(port.shape)))

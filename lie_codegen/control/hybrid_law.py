@@ -24,9 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.control.attitude_law import _rotation
+from lie_codegen.control.attitude_ports import random_rotation
 from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.control.warp import gap_matrix, levels, warp_of, warped_level
+from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
@@ -52,10 +53,6 @@ from lie_codegen.kernel.linear import (
     transpose,
 )
 from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, sample_inputs, values_of
-from lie_codegen.on_demand import scipy
-
-#: Two pair sums that differ by less, relative to the largest, give critical circles, on which the gap is zero.
-_DISTINCT = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,10 +102,10 @@ class HybridLaw(Kernel):
         K = np.array(self.gain)
         _, axes = np.linalg.eigh(K)
         u = axes.T @ np.array(self.direction)
-        A, m = _levels(np.linalg.eigvalsh(K), u)
+        A, m = levels(np.linalg.eigvalsh(K), u)
         found = []
         for i in range(3):
-            x = _warped_level(self.kappa, A[i], m[i])
+            x = warped_level(self.kappa, A[i], m[i])
             half = 2 * np.outer(axes[:, i], axes[:, i]) - np.eye(3)
             w = np.array(self.direction)
             W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
@@ -169,7 +166,7 @@ def hybrid_law(
         ),
     )
     gain = as_floats(K)
-    u, warp, most, gaps = _warp(gain, kappa, direction)
+    u, warp, most, gaps = warp_of(gain, kappa, direction)
     delta = min(gaps) / 2 if hysteresis is None else float(hysteresis)
     if not 0 < delta < min(gaps):
         raise InputError(
@@ -183,7 +180,7 @@ def hybrid_law(
         metric, D = values_of(ops, parameters, given)
         E = matmul(transpose(X_d), X)
         weights, axis = constant_matrix(ops, K), [ops.constant(x) for x in u]
-        phi, slope = _trace(weights, E, _gap_matrix(X, X_d))
+        phi, slope = _trace(weights, E, gap_matrix(X, X_d))
         sign = ops.where(ops.less(q, 0), ops.constant(-1), ops.constant(1))
         here = _warped(ops, derivation, weights, E, phi, axis, warp, sign)
         there = _warped(ops, derivation, weights, E, phi, axis, warp, -sign)
@@ -204,9 +201,9 @@ def hybrid_law(
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         vectors = [[rng.uniform(-1, 1) for _ in range(3)] for _ in range(3)]
         return (
-            _rotation(rng),
+            random_rotation(rng),
             vectors[0],
-            _rotation(rng),
+            random_rotation(rng),
             vectors[1],
             vectors[2],
             rng.choice([-1.0, 1.0]),
@@ -239,10 +236,6 @@ def hybrid_law(
     return nan_off_group(made, group, ("X", "X_d"))  # type: ignore[return-value]
 
 
-def _gap_matrix(X: Matrix, X_d: Matrix) -> Matrix:
-    return [[a - b for a, b in zip(r, s, strict=True)] for r, s in zip(X, X_d, strict=True)]
-
-
 def _trace(K: Matrix, E: Matrix, difference: Matrix) -> tuple[Scalar, Vector]:
     """phi = tr(K D^T D)/4, D = R - R_d, which does not cancel near the reference, and d phi = skew(K E)^."""
     phi = dot([x for row in matmul(difference, K) for x in row], [x for row in difference for x in row]) / 4
@@ -270,71 +263,3 @@ def _warped(
     T = matmul(E, turn)
     value = dot([x for row in K for x in row], [(1 if i == j else 0) - T[i][j] for j in range(3) for i in range(3)]) / 2
     return value, _slope(K, T), turn
-
-
-def _levels(values: Array, u: Array) -> tuple[Array, Array]:
-    """A_i and m_i in the eigenbasis."""
-    A = np.sum(values) - values
-    square = u**2
-    m = np.array([A[j] * square[k] + A[k] * square[j] for j, k in ((1, 2), (2, 0), (0, 1))])
-    return A, m
-
-
-def _warped_level(kappa: float, A: float, m: float) -> float:
-    """x = cos^2(kappa x/2) A + sin^2(kappa x/2) m, between m and A."""
-
-    def off(x: float) -> float:
-        c = np.cos(kappa * x / 2) ** 2
-        return float(x - c * A - (1 - c) * m)
-
-    low, high = min(A, m), max(A, m)
-    return float(scipy.optimize.brentq(off, low - 1e-9, high + 1e-9, xtol=1e-14)) if high > low else A
-
-
-def _warp(K: Array, kappa: Any, direction: Any) -> tuple[tuple[float, ...], float, float, tuple[float, ...]]:
-    """u in body axes, kappa, kappa_max and the gaps.
-
-    Raises:
-        InputError, ShapeError: as `hybrid_law`.
-    """
-    values, axes = np.linalg.eigh(K)
-    sums = np.sum(values) - values
-    if np.min(np.abs(np.diff(sums))) <= _DISTINCT * np.max(sums):
-        listed = ", ".join(f"{x:.6g}" for x in values)
-        raise InputError(
-            f"hybrid_law: K_p has the eigenvalues {listed}; two are equal, which gives critical circles and no gap: make them differ"
-        )
-    if direction is None:
-        u = axes @ np.sqrt(_best_square(sums))
-    else:
-        u = np.asarray(direction, dtype=float)
-        if u.shape != (3,) or not np.all(np.isfinite(u)) or not np.any(u):
-            raise ShapeError(f"hybrid_law: direction has shape {u.shape}; give three numbers, not all zero")
-        u = u / np.linalg.norm(u)
-    hat = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
-    singular = np.linalg.svd(hat @ K, compute_uv=False)
-    most = float(2 / (singular[0] + singular[1]))
-    warp = 0.9 * most if kappa is None else float(kappa)
-    if not 0 < warp < most:
-        raise InputError(
-            f"hybrid_law: kappa = {warp:g} must lie between 0 and kappa_max = {most:.6g}, where the warp folds"
-        )
-    A, m = _levels(values, axes.T @ u)
-    gaps = tuple(float(np.sin(warp * _warped_level(warp, a, b)) ** 2 * (a - b)) for a, b in zip(A, m, strict=True))
-    if min(gaps) <= 0:
-        raise InputError(
-            f"hybrid_law: direction = {u.tolist()} leaves no gap (the least is {min(gaps):.6g}); without it the best is taken"
-        )
-    return tuple(float(x) for x in u), warp, most, gaps
-
-
-def _best_square(A: Array) -> Array:
-    """(u_i^2) that makes the least of A_i - m_i largest: maximise s with A_i - (A_j w_k + A_k w_j) >= s, w >= 0, sum w = 1."""
-    rows = np.zeros((3, 4))
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        rows[i, k], rows[i, j], rows[i, 3] = A[j], A[k], 1
-    found = scipy.optimize.linprog(
-        [0, 0, 0, -1], A_ub=rows, b_ub=A, A_eq=[[1, 1, 1, 0]], b_eq=[1], bounds=[(0, 1)] * 3 + [(None, None)]
-    )
-    square = np.maximum(found.x[:3], 0)
-    return np.asarray(square / np.sum(square))

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from lie_codegen.control.curve_reference import CurveReference, curve_kernel
-from lie_codegen.control.loop_kernels import COMMAND, called, limited
+from lie_codegen.control.loop_call import COMMAND, called, limited
 from lie_codegen.control.loop_model import Loop
 from lie_codegen.control.plants import GroupPlant
 from lie_codegen.control.reference_kernels import reference_kernel

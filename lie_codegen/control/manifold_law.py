@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen.control.manifold import PLACES, Manifold, read_formula, read_rows, symbols_of
+from lie_codegen.control.manifold import PLACES, Manifold
+from lie_codegen.control.manifold_formulas import read_formula, read_rows, symbols_of
 from lie_codegen.errors import IncompatibleError, InputError
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.identifiers import check_identifier

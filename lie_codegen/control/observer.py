@@ -23,14 +23,21 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.positive_matrix import positive_number, real_number
+from lie_codegen.control.observed_vectors import (
+    acting_matrices,
+    known_value,
+    not_negative,
+    observed_vectors,
+    rank_of_outputs,
+    vector_weights,
+)
+from lie_codegen.errors import InputError
+from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, real_rows, velocity_units
-from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -38,13 +45,9 @@ from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matmul, matvec, minus, number, plus, scaled
-from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, sample_inputs, values_of
+from lie_codegen.kernel.parameter import input_ports, parameter, sample_inputs, values_of
 from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import scipy
-from lie_codegen.on_demand import sympy as sp
-
-#: Singular values of {A_a c_i}, relative to the largest, that count as zero.
-_RANK = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,23 +168,23 @@ def observer(
         raise InputError(
             f"observer: {group.name} is complex: what a body sees of it are vectors of the algebra, y = Ad_(X^-1) z; give directions"
         )
-    acting = _acting(group)
+    acting = acting_matrices(group)
     d = acting.shape[1]
     rigid = outputs is None and not np.any(acting[:, d - 1, :])
     seen = d - 1 if rigid else d
-    vectors = _vectors(directions, points, outputs, d, rigid=rigid)
+    vectors = observed_vectors(directions, points, outputs, d, rigid=rigid)
     count = len(vectors)
     parameters = (
         parameter(
             Port("weights", (count,), description="k_i of the vectors"),
             weights,
-            lambda value, _: _weights(value, count),
+            lambda value, _: vector_weights(value, count),
         ),
         parameter(Port("k_p", (), "1/s", description="gain of the estimate"), k_p, positive_number),
-        parameter(Port("k_i", (), "1/s^2", description="gain of the bias"), k_i, _not_negative),
+        parameter(Port("k_i", (), "1/s^2", description="gain of the bias"), k_i, not_negative),
     )
     floats = tuple(tuple(float(x) for x in c) for c in vectors)
-    rank, n = _rank(acting, floats), group.dim
+    rank, n = rank_of_outputs(acting, floats), group.dim
     if rank < n and not reduced:
         raise InputError(
             f"observer: {count} vector(s) determine {rank} of {n} components on {group.name}: "
@@ -227,8 +230,8 @@ def observer(
         basis=tuple(tuple(map(tuple, matrix)) for matrix in acting.tolist()),
         vectors=floats,
         weights=tuple(float(w) for w in parameters[0].value or ()),
-        k_p=_known(parameters[1]),
-        k_i=_known(parameters[2]),
+        k_p=known_value(parameters[1]),
+        k_i=known_value(parameters[2]),
         measured=seen,
     )
     return nan_off_group(made, group, ("X_hat",))  # type: ignore[return-value]
@@ -262,64 +265,3 @@ def corrections(
     back = matrices.Ad(inverse, X, grad)
     columns = [matrices.Ad(X, inverse, unit) for unit in units]
     return back, [dot(column, grad) for column in columns]
-
-
-def _vectors(directions: Any, points: Any, outputs: Any, d: int, *, rigid: bool) -> list[list[sp.Expr]]:
-    """The c_i, exact."""
-    found: list[list[sp.Expr]] = []
-    size = d - 1 if rigid else d
-    for given, last, what in ((directions, 0, "directions"), (points, 1, "points"), (outputs, None, "outputs")):
-        if given is None:
-            continue
-        if what == "points" and not rigid:
-            raise InputError("observer: points are seen on SE(n); on SO(n) give directions")
-        rows = given.tolist() if hasattr(given, "tolist") else list(given)
-        rows = rows if (rows and isinstance(rows[0], list | tuple)) or hasattr(rows[0], "tolist") else [rows]
-        for i, row in enumerate(rows):
-            entries = [real_number(x, f"{what}[{i}]") for x in (row.tolist() if hasattr(row, "tolist") else row)]
-            if len(entries) != (d if last is None else size):
-                raise ShapeError(
-                    f"observer: {what}[{i}] has {len(entries)} entries; give {d if last is None else size}"
-                )
-            if last == 0 and not any(entries):
-                raise InputError(f"observer: directions[{i}] is zero")
-            found.append([*entries, sp.Integer(last)] if rigid and last is not None else entries)
-    if not found:
-        raise InputError("observer: give directions, points or outputs")
-    return found
-
-
-def _known(gain: Parameter) -> float:
-    return float("nan") if gain.value is None else float(gain.value)
-
-
-def _not_negative(value: Any, name: str) -> sp.Expr:
-    found = real_number(value, name)
-    if not found >= 0:
-        raise InputError(f"{name} = {found} must not be negative")
-    return found
-
-
-def _weights(weights: Any, count: int) -> list[sp.Expr]:
-    if weights is None:
-        return [sp.S.One] * count
-    values = weights.tolist() if hasattr(weights, "tolist") else weights
-    values = list(values) if isinstance(values, list | tuple) else [values] * count
-    if len(values) != count:
-        raise ShapeError(f"observer: {len(values)} weights for {count} vectors")
-    return [positive_number(w, f"weights[{i}]") for i, w in enumerate(values)]
-
-
-def _acting(group: MatrixGroup) -> Array:
-    """(n, d, d) the A_a as they act on the vectors: the group's own matrices, or ad_a, (ad_a)_cb = c_ab^c, where these are complex."""
-    if not group.is_complex:
-        return np.asarray(group.basis)
-    constants = np.asarray(group.algebra.structure_constants, dtype=float)
-    return np.asarray(np.swapaxes(constants, 1, 2))
-
-
-def _rank(acting: Array, vectors: Sequence[Sequence[float]]) -> int:
-    """Of {A_a c_i}: n where the outputs determine the state near any place."""
-    moved = np.einsum("aij,kj->aki", acting, np.array(vectors)).reshape(len(acting), -1)
-    values = np.linalg.svd(moved, compute_uv=False)
-    return int(np.sum(values > _RANK * max(1e-300, values[0])))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.control.attitude_law import _rotation
+from lie_codegen.control.attitude_ports import random_rotation
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import as_floats, body_inertia, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -197,8 +197,8 @@ def output_feedback_law(
         return minus(negative(s), pull), matvec(filter_gain, s)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
-        R = np.array(_rotation(rng))
-        return _rotation(rng), (z @ R).tolist(), *sample_inputs(parameters, rng)
+        R = np.array(random_rotation(rng))
+        return random_rotation(rng), (z @ R).tolist(), *sample_inputs(parameters, rng)
 
     made = OutputFeedback(
         name=name,

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from lie_codegen.control.attitude import gyroscopic_factor
-from lie_codegen.control.attitude_law import _rotation
+from lie_codegen.control.attitude_ports import random_rotation
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number, real_number
 from lie_codegen.groups.maps.admission import NEAR_GROUP
@@ -109,7 +109,7 @@ def pointing_law(
         body=body,
         formula=f"tau = -k_p y x b - K_d omega + {factor} omega x I omega; spin {spin}",
         source="Geyer, The Attitude Control Problem, section 9; Bullo and Murray, CIT-CDS 97-003, Lemma 3.3",
-        sampler=lambda rng: ([row[2] for row in _rotation(rng)], _drawn(rng), *sample_inputs(parameters, rng)),
+        sampler=lambda rng: ([row[2] for row in random_rotation(rng)], _drawn(rng), *sample_inputs(parameters, rng)),
     )
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import random
 from typing import Any
 
-from lie_codegen.control.attitude_law import _rotation
+from lie_codegen.control.attitude_ports import random_rotation
 from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number
@@ -95,7 +95,14 @@ def quaternion_law(
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         vectors = [[rng.uniform(-1, 1) for _ in range(3)] for _ in range(3)]
         last = [rng.uniform(-1, 1) for _ in range(4)]
-        return _rotation(rng), vectors[0], _rotation(rng), *vectors[1:], last, *sample_inputs(parameters, rng)
+        return (
+            random_rotation(rng),
+            vectors[0],
+            random_rotation(rng),
+            *vectors[1:],
+            last,
+            *sample_inputs(parameters, rng),
+        )
 
     made = Kernel(
         name=name,

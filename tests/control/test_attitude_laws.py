@@ -13,7 +13,8 @@ from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
 from lie_codegen.control.attitude import attitude_linearisation, attitude_region, cross_term_bound, gains_for_response
-from lie_codegen.control.attitude_law import attitude_law, attitude_lyapunov
+from lie_codegen.control.attitude_law import attitude_law
+from lie_codegen.control.attitude_lyapunov import attitude_lyapunov
 from lie_codegen.errors import InertiaWarning, InputError
 from lie_codegen.groups.maps.quaternion import rotation_from_quaternion, with_quaternion
 from lie_codegen.groups.maps.rotation_log import rotation_log

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import lie_codegen as lc
-from lie_codegen.control.attitude_law import attitude_lyapunov
+from lie_codegen.control.attitude_lyapunov import attitude_lyapunov
 from lie_codegen.control.force_limits import with_limits
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.kernel import Kernel

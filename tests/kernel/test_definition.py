@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import lie_codegen as lc
-from lie_codegen.control.attitude_law import attitude_lyapunov
+from lie_codegen.control.attitude_lyapunov import attitude_lyapunov
 from lie_codegen.control.force_limits import with_limits
 from lie_codegen.control.reference_kernels import reference_kernel
 from lie_codegen.control.second_order_step import held_force_step, second_order_step

@@ -1,0 +1,89 @@
+"""What a run of a closed loop says at its times: configuration, velocity, states, outputs and command of the law, the reference."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.arrays import Array
+from lie_codegen.control.loop_arguments import LoopArguments
+from lie_codegen.control.loop_origin import LoopMaking, loop_origin
+from lie_codegen.control.loop_result import ClosedLoop
+from lie_codegen.control.loop_run import Run
+from lie_codegen.control.loop_states import own_states
+from lie_codegen.flow.events import EventHits
+from lie_codegen.flow.pair853 import PairRun
+from lie_codegen.kernel.kernel import Port
+
+
+def result_of(
+    run: Run,
+    told: LoopArguments,
+    found: Array,
+    count: int,
+    error: float,
+    pair: PairRun | None = None,
+    events: tuple[EventHits, ...] = (),
+) -> ClosedLoop:
+    """The closed loop of states (k, m), or (k, N, m) of N loops, at its times, with what made it.
+
+    Args:
+        run, told: the loop and its arguments.
+        found: the states.
+        count: steps from one output to the next, where they are equal.
+        error: estimate on the entries.
+        pair: steps of the adaptive run, if it was one.
+        events: what was found along it.
+    """
+    loop, times = run.loop, run.times
+    X, xi = loop.plant.split(found)
+    states = own_states(loop, found, sampled=bool(run.sample))
+    outputs, u, moves = _outputs(run, found)
+    if run.sample and loop.law is not None:
+        u = np.ascontiguousarray(found[..., -loop.plant.sizes[2] :])
+    if loop.plant.order == 1 and u is not None:
+        xi = u
+    gap = run.sample or float(times[1] - times[0])
+    steps = pair.steps if pair is not None else count * round((times[-1] - times[0]) / gap)
+    group = getattr(loop.plant, "group", None)
+    shared = {name: value for name, value in states.items() if name not in outputs}
+    making = LoopMaking(run, told.model, told.reference, told.rtol, count, pair)
+    return ClosedLoop(
+        times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group, events,
+        loop_origin(making, told.kind if pair is None else "adaptive"),
+    )._made_by(making)  # fmt: skip
+
+
+def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
+    """What the law gives at the times, its command within the limits, and the reference."""
+    loop, times = run.loop, run.times
+    moves = run.reference(times)
+    if loop.law is None:
+        return {}, None, moves
+    inner = loop.extent(sampled=False)
+    states = found[..., :inner]
+    if run.sample:  # the own states as the law used them stand behind those that it will use next
+        place = sum(loop.plant.sizes[:2])
+        own = inner - place
+        states = np.concatenate([found[..., :place], found[..., place + own : place + 2 * own]], axis=-1)
+    shape = states.shape[:-1]
+    repeats = shape[1] if run.many else 1
+    kernel = run.library.loop_outputs
+    given: dict[str, Any] = {"t": np.repeat(times, repeats), "h": run.sample}
+    given |= {name: np.repeat(value, repeats, axis=0) if run.many else value for name, value in moves.items()}
+    given |= {
+        port.name: _repeated(port, run.numbers[port.name], len(times))
+        for port in kernel.inputs
+        if port.name in run.numbers
+    }
+    names = [port.name for port in kernel.inputs[1:]]
+    flat = np.ascontiguousarray(states.reshape(-1, inner))
+    made = kernel.batch(flat, **{name: given[name] for name in names}, threads=run.threads)
+    values = {port.name: v.reshape(*shape, *v.shape[1:]) for port, v in zip(kernel.outputs, made, strict=True)}
+    return values, values.pop(kernel.outputs[-1].name), moves
+
+
+def _repeated(port: Port, values: Array, times: int) -> Array:
+    """One a sample of all loops at all times, where there is one a loop."""
+    return values if values.ndim == len(port.shape) else np.tile(values, (times, *[1] * len(port.shape)))
