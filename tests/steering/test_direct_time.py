@@ -127,6 +127,17 @@ def test_reeds_and_shepps_car_turns_in_three_arcs(goal: tuple[float, float, floa
     assert plan.duration == pytest.approx(least, abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_word_without_the_arc_it_needs_gets_it(seed: int) -> None:
+    """R- L+ S+ R+ of 1.0362528, pi / 2, 1.9495608, 0.0136294 (Reeds and Shepp's formulas): random words end 7e-5 above, with a short R+
+    before the straight arc instead of behind it."""
+    goal = (-2.9008341868288254, 1.879621435201635, 2.5934197786078093)
+    plan = lc.steer("se2", pose(*goal), ("omega", "vx"), 5.0, objective="time", vertices=CAR, bounds=1, seed=seed)
+    assert plan.duration == pytest.approx(4.5702392814, rel=1e-9)
+    assert [arc[:2] for arc in plan.details["arcs"]] == [(1, -1), (1, 1), (0, 1), (-1, 1)]
+    assert plan.details["arcs"][1][2] == pytest.approx(np.pi / 2, abs=1e-4)
+
+
 def test_reeds_and_shepps_car_drives_mirrored_ways_in_the_same_time() -> None:
     # reflections of time and of the plane: exact symmetries of the shortest ways
     x, y, angle = 0.7, -0.4, 1.9

@@ -95,3 +95,20 @@ def long_words(letters: int, arcs: int, lanes: int, rng: np.random.Generator) ->
     for k in range(1, arcs if letters > 1 else 0):
         words[:, k] = (words[:, k - 1] + rng.integers(1, letters, lanes)) % letters
     return words
+
+
+def with_one_more(word: Array, durations: Array, letters: int) -> tuple[Array, Array]:
+    """Words (lanes, K + 2) and durations of the same motion, with a letter of no duration before, in the middle of or after one of the
+    arcs, every other letter in turn."""
+    words, lengths = [], []
+    for k, share, letter in product(range(len(word)), (0.0, 0.5, 1.0), range(letters)):
+        if letter != word[k]:
+            words.append([*word[:k], word[k], letter, *word[k:]])
+            lengths.append([*durations[:k], share * durations[k], 0.0, (1 - share) * durations[k], *durations[k + 1 :]])
+    return np.array(words, dtype=int), np.array(lengths)
+
+
+def with_one_less(word: Array, durations: Array) -> tuple[Array, Array]:
+    """Words (K, K - 1) and durations without one of the arcs, each in turn."""
+    others = ~np.eye(len(word), dtype=bool)
+    return np.array([word[kept] for kept in others]), np.array([durations[kept] for kept in others])

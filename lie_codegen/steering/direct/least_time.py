@@ -18,13 +18,19 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError
-from lie_codegen.steering.direct.arc_words import letters_of, long_words, longest_useful, short_words
-from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
+from lie_codegen.steering.direct.arc_descent import sharpened, tidied, with_other_arcs, words_programme
+from lie_codegen.steering.direct.arc_words import (
+    letters_of,
+    long_words,
+    longest_useful,
+    short_words,
+)
+from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.flight import landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.polish import Flown
-from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Settings, chosen
+from lie_codegen.steering.direct.programme import Machine, Settings, chosen
 from lie_codegen.steering.direct.report import error_at, plan_of
 from lie_codegen.steering.direct.search import threshold
 from lie_codegen.steering.plan import Plan, Status
@@ -34,7 +40,6 @@ _LONG = 3
 _KEPT = 64
 #: The shortest words, which are descended again to the last digits.
 _SHARPENED = 8
-_GONE = 1e-9
 _AGREEING = 1e-3
 #: Starts that must agree on the shortest before another round is not tried.
 _ENOUGH = 3
@@ -94,10 +99,11 @@ def least_time(
     if not best:
         raise _not_found(task, target, tolerance, letters, nearest, tried, total, seed, longest, began)
     best = [
-        *(_sharpened(arcs, solver, velocities, limits, each, settings, longest) for each in best[:_SHARPENED]),
+        *(sharpened(arcs, solver, velocities, limits, each, settings, longest) for each in best[:_SHARPENED]),
         *best[_SHARPENED:],
     ]
     best.sort(key=lambda each: each[0])
+    best[0] = with_other_arcs(arcs, solver, velocities, limits, best[0], settings, longest)
     for _, word, durations, variant in best[:_KEPT]:
         flown, sequence = _flown(task, letters, word, durations, variant)
         if flown.miss <= max(1e-9, 1e-2 * tolerance):
@@ -170,7 +176,7 @@ def _solve(
     """(duration, word, durations, variant) of words that reach the goal, the shortest of them descended; and (residual, word,
     durations, variant) of the nearest."""
     lanes, count = words.shape
-    programme = _words_programme(arcs, velocities, words, longest)
+    programme = words_programme(arcs, velocities, words, longest)
     variant = np.arange(lanes) % len(arcs.end.values)
     # durations that add up to between a third and three times the given one
     parts = rng.dirichlet(np.ones(count), lanes) * (3.0 ** rng.uniform(-1, 1, (lanes, 1)))
@@ -192,81 +198,12 @@ def _solve(
     lower = solver.descend(part, aim, found.u[there], settings)
     results = []
     for lane, number in enumerate(there):
-        word, durations, size = _tidied(
+        word, durations, size = tidied(
             arcs, solver, velocities, limits, words[number], lower.u[lane], int(variant[number]), settings, longest
         )
         if size <= threshold(arcs, settings) and np.sum(arcs.own(durations)) <= longest:
             results.append((float(np.sum(arcs.own(durations))), word, durations, int(variant[number])))
     return results, near
-
-
-def _sharpened(
-    arcs: Manoeuvre,
-    solver: Machine,
-    velocities: Array,
-    limits: Array,
-    candidate: tuple[float, Array, Array, int],
-    settings: Settings,
-    longest: float,
-) -> tuple[float, Array, Array, int]:
-    """The candidate, descended on its own word until nothing is gained."""
-    total, word, u, variant = candidate
-    fine = replace(settings, relative=1e-14, descend_iterations=2 * settings.descend_iterations)
-    programme = _words_programme(arcs, velocities, word[None], longest)
-    lower = solver.descend(programme, arcs.goal(np.array([variant])), u[None], fine)
-    shorter, durations, size = _tidied(arcs, solver, velocities, limits, word, lower.u[0], variant, settings, longest)
-    now = float(np.sum(arcs.own(durations)))
-    better = size <= threshold(arcs, settings) and now < total
-    return (now, shorter, durations, variant) if better else candidate
-
-
-def _words_programme(arcs: Manoeuvre, velocities: Array, words: Array, longest: float) -> Programme:
-    """Arcs as exponentials of one control each, their duration."""
-    lanes, count = words.shape
-    table = (np.zeros_like(velocities), velocities[:, None], np.zeros(count, int))
-    limited = replace(arcs, high=np.full(1, longest))
-    programme = programme_of(limited, table, np.arange(count), np.tile([1.0, 0.0], (count, 1)), np.ones(count))
-    entry = np.repeat(programme.entry, lanes, axis=0)
-    before = arcs.free_slots[0]
-    entry[:, before : before + count] = words
-    return replace(programme, entry=entry)
-
-
-def _tidied(
-    arcs: Manoeuvre,
-    solver: Machine,
-    velocities: Array,
-    limits: Array,
-    word: Array,
-    u: Array,
-    variant: int,
-    settings: Settings,
-    longest: float,
-) -> tuple[Array, Array, float]:
-    """The word without empty arcs, full turns and repeated letters, brought to the goal again; the residual."""
-    before, after = arcs.free_slots
-    durations = arcs.own(u)[:, 0]
-    turns = limits[word] < longest
-    durations = np.where(turns, np.mod(durations, np.where(turns, limits[word], 1.0)), durations)
-    durations = np.where(turns & (limits[word] - durations < _GONE), 0.0, durations)
-    letters: list[int] = []
-    lengths: list[float] = []
-    for letter, length in zip(word, durations, strict=True):
-        if length <= _GONE:
-            continue
-        if letters and letters[-1] == letter:
-            lengths[-1] += length
-        else:
-            letters.append(int(letter))
-            lengths.append(float(length))
-    if not letters:
-        letters, lengths = [int(word[0])], [0.0]
-    kept = np.array(letters)
-    short = np.concatenate([u[:before], np.array(lengths)[:, None], u[len(u) - after :]])
-    programme = _words_programme(arcs, velocities, kept[None], longest)
-    goal: Goal = arcs.goal(np.array([variant]))
-    found = solver.reach(programme, goal, short[None], replace(settings, damping=1e-9, reach_iterations=12))
-    return kept, found.u[0], float(found.size[0])
 
 
 def _flown(
