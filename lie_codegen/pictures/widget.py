@@ -25,7 +25,7 @@ def widget(
     title: str | None = None,
     samples: int = 401,
     solve: bool = False,
-    height: int = 640,
+    height: int | None = None,
 ) -> Any:
     """The page of `lc.view` as an anywidget: the last line of a cell in Jupyter, JupyterLab, VS Code or Colab shows it; in marimo `mo.ui.anywidget(lc.widget(plan))`.
 
@@ -40,13 +40,15 @@ def widget(
         title: heading of the page.
         samples: times shown of a Plan and of an average.
         solve: of a plan without bounds on rotations or poses: moving the target, by drag or sliders, solves again in the cell.
-        height: of the cell's output, pixels.
+        height: of the cell's output, pixels; None: that of the page, whose charts lie beside the view or below it as the cell is wide.
 
     Raises:
         MissingDependencyError: anywidget is not installed: the extra `lie_codegen[widget]`.
         InputError: as `lc.view`; a height that is no whole number from 200 to 4000.
     """
-    if isinstance(height, bool) or not isinstance(height, int) or not _LEAST <= height <= _TALLEST:
+    if height is not None and (
+        isinstance(height, bool) or not isinstance(height, int) or not _LEAST <= height <= _TALLEST
+    ):
         raise InputError(f"widget: height lies between {_LEAST} and {_TALLEST} pixels, given {height!r}")
     made = _widget_class()
     page = page_text(what, group=group, body=body, obstacles=obstacles, title=title, samples=samples, solve=solve)
@@ -70,7 +72,7 @@ def _widget_class() -> Any:
 
         _esm = (template_folder() / "page_widget.js").read_text(encoding="utf-8")
         page = traitlets.Unicode("").tag(sync=True)
-        height = traitlets.Int(640).tag(sync=True)
+        height = traitlets.Int(None, allow_none=True).tag(sync=True)
         place = traitlets.Int(0).tag(sync=True)
 
     return PageWidget

@@ -74,3 +74,14 @@ def test_place_goes_both_ways_in_a_browser(plan: lc.Plan, tmp_path: Path, tab: A
     tab.frame_locator("iframe").locator("#time").fill("12")
     assert tab.evaluate("[model.get('place'), saved]") == [12, 1]
     assert tab.evaluate("document.querySelector('iframe').clientHeight") == 500
+    # without a height the cell is as tall as the page, beside the view or below it, and nothing of it is cut
+    tab.evaluate("model.set('height', null)")
+    tall = {}
+    for width in (1200, 500):
+        tab.set_viewport_size({"width": width, "height": 700})
+        tab.wait_for_timeout(300)
+        tall[width], needed = tab.evaluate(
+            "(f => [f.clientHeight, f.contentDocument.documentElement.scrollHeight])(document.querySelector('iframe'))"
+        )
+        assert tall[width] >= needed > 300
+    assert tall[500] > tall[1200] + 100
