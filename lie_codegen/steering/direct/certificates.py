@@ -1,7 +1,8 @@
 """Proofs that no controls within the bounds reach the goal in the time; anything that is not proved here is not called infeasible.
 
 With anti-Hermitian velocities a path of speed |a| in a bi-invariant norm is at least as long as the principal logarithm of
-X0^-1 T in that norm (Frobenius and spectral here, in all of U(d)). A column X e of motions with X' = X hat(a) moves at the speed
+X0^-1 T in that norm (Frobenius and spectral here, in all of U(d)). Ways of two controls alone are longer than that where they must turn
+by brackets: `shortest` says how long at least. A column X e of motions with X' = X hat(a) moves at the speed
 |hat(a) e|, and so at least the straight way. Both speeds are convex in the controls: their largest value is at a vertex of the box.
 """
 
@@ -16,6 +17,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.direct.shortest import least_length
 from lie_codegen.steering.end import has_positions
 
 _MOST_CONTROLS = 10
@@ -28,7 +30,7 @@ class Certificate:
     """A proof of infeasibility: what the goal needs is more than the bounds allow.
 
     Attributes:
-        kind: "distance" (the whole motion), "turn" or "position".
+        kind: "distance" (the whole motion), "length" (of ways of these controls), "turn" or "position".
         need: length of the shortest way, in the unit of `kind`: a norm of the logarithm, rad, or m.
         most: the longest way that the bounds allow in the time.
     """
@@ -38,7 +40,12 @@ class Certificate:
     most: float
 
     def __str__(self) -> str:
-        what = {"distance": "the goal is", "turn": "the turn is", "position": "the position is"}[self.kind]
+        what = {
+            "distance": "the goal is",
+            "length": "along these controls the goal is",
+            "turn": "the turn is",
+            "position": "the position is",
+        }[self.kind]
         return f"{what} {self.need:.6g} away, and the bounds allow at most {self.most:.6g} in the time"
 
 
@@ -47,7 +54,7 @@ def certificate(task: Manoeuvre) -> Certificate | None:
     speeds = _vertices(task)
     if speeds is None:
         return None
-    found = [each for each in (_whole(task, speeds), _columns(task, speeds)) if each is not None]
+    found = [each for each in (_whole(task, speeds), _columns(task, speeds), _along(task)) if each is not None]
     return max(found, key=lambda each: each.need / max(each.most, 1e-300), default=None)
 
 
@@ -81,6 +88,20 @@ def _whole(task: Manoeuvre, speeds: Array) -> Certificate | None:
 def _anti_hermitian(group: MatrixGroup) -> bool:
     """Whether every velocity of the group is."""
     return bool(np.allclose(group.basis, -np.conj(np.swapaxes(group.basis, 1, 2)), atol=1e-12))
+
+
+def _along(task: Manoeuvre) -> Certificate | None:
+    """By the length of ways of two controls without drift; of every variant of the goal, or there is no proof."""
+    system, end, now = task.system, task.end, np.zeros(1)
+    if end.elements is None or len(end.before) or len(end.after) or system.right or np.any(system.drift.at(now)):
+        return None
+    controls = system.directions_at(now)[0]
+    needs = [least_length(system.group, controls, np.linalg.solve(system.start, each)) for each in end.elements]
+    known = [each for each in needs if each is not None]
+    if len(known) < len(needs):
+        return None
+    most = float(np.linalg.norm(np.maximum(np.abs(task.low), np.abs(task.high)))) * task.duration
+    return _proof("length", min(known), most)
 
 
 def _columns(task: Manoeuvre, speeds: Array) -> Certificate | None:

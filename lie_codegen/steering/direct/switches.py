@@ -34,6 +34,11 @@ _THERE = 1e-10
 _BRIEF = 2e-3
 #: Of an arc that is put in between others, at first.
 _NEW = 0.01
+#: By how much arcs may miss the goal for one more to be tried, in units of its size.
+_MISSED = 0.1
+
+#: Durations (K,), controls (K, m), and which of these move (all where None).
+_Try = tuple[Array, Array, Array | None]
 
 
 def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown, int] | None:
@@ -44,29 +49,38 @@ def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown,
     bounded = np.all(np.isfinite(task.low)) and np.all(np.isfinite(task.high))
     if not task.system.steady or not bounded or any(task.free_slots):
         return None
+    scale = max(1.0, float(np.max(np.abs(task.end.values))))
     for number, (u, variant) in enumerate(near):
         bang = np.where(u < (task.low + task.high) / 2, task.low, task.high)
-        tries: list[tuple[Array, Array, Array | None]] = [
-            (*_arcs(task, u, _BLUR), None),
-            (*_arcs(task, bang, _BLUR), None),
-        ]
+        tries: list[_Try] = [(*_arcs(task, u, _BLUR), None), (*_arcs(task, bang, _BLUR), None)]
+        wider: list[_Try] = []
         for alike in _COARSE:
             durations, means = _arcs(task, u, alike)
             letters, held = _letters(task, means, durations < 1.5 * task.duration / len(u))
             tries.append((durations, letters, ~held))
             if number < _WIDENED and len(letters) <= _FEW and task.controls <= _CORNERED:
-                tries += _with_one_more(task, durations, letters, held)
-        for s, v, moving in tries:
-            durations, controls = _solved(task, s, v, moving, variant)
-            # the piece in which a switch was shrinks without end: the steps get on when it is gone
-            long = durations > _BRIEF * task.duration
-            if not np.all(long) and np.any(long):
-                rest = None if moving is None else moving[long]
-                durations, controls = _solved(task, durations[long], controls[long], rest, variant)
-            flown = _flown(task, durations, controls, variant)
-            if flown.miss <= _THERE * max(1.0, float(np.max(np.abs(task.end.values)))):
+                wider += _with_one_more(task, durations, letters, held)
+        nearest = np.inf
+        for place, each in enumerate([*tries, *wider]):
+            if place == len(tries) and nearest > _MISSED * scale:
+                break  # an arc shorter than a piece does not make up for that
+            flown = _ended(task, each, variant)
+            if flown.miss <= _THERE * scale:
                 return flown, variant
+            nearest = min(nearest, flown.miss)
     return None
+
+
+def _ended(task: Manoeuvre, given: _Try, variant: int) -> Flown:
+    """The arcs, brought as near to the goal as they come, and flown."""
+    s, v, moving = given
+    durations, controls = _solved(task, s, v, moving, variant)
+    # the piece in which a switch was shrinks without end: the steps get on when it is gone
+    long = durations > _BRIEF * task.duration
+    if not np.all(long) and np.any(long):
+        rest = None if moving is None else moving[long]
+        durations, controls = _solved(task, durations[long], controls[long], rest, variant)
+    return _flown(task, durations, controls, variant)
 
 
 def _arcs(task: Manoeuvre, u: Array, alike: float) -> tuple[Array, Array]:
