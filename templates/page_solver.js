@@ -40,7 +40,7 @@
       m.R.push(...R.flat());
       if (m.p) m.p.push(...p);
     }
-    if (data.target) data.target.p = pose(found.goal).p;
+    if (data.target) { const { R, p } = pose(found.goal); Object.assign(data.target, { R: R.flat(), p }); }
     data.series[0].values = Array.from({ length: s.controls }, (_, c) => data.t.map((_, k) => found.u[s.controls * k + c] / s.duration));
     data.series[1].name = "|X - target|";
     data.series[1].values = [data.t.map((_, k) => Math.hypot(...end.map((v, i) => found.X[size * k + i] - v)))];

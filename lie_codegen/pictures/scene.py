@@ -48,7 +48,7 @@ class Scene:
     curves: Sequence[Curves]
     facts: Sequence[tuple[str, str]]
     names: Sequence[str] = ()
-    target: Array | None = None
+    target: Motion | None = None
     obstacles: Sequence[Obstacle] = ()
     solver: Mapping[str, Any] = field(default_factory=dict)
 
@@ -128,7 +128,7 @@ def scene_data(scene: Scene, body: str | None, faces: Sequence[Any] | None) -> d
         "sphere": 1.0 if first.p is None else 0,
         "ground": first.kind == "pose",
         "grid": _round(span / 8 if span > 0 else 1.0),
-        "target": None if scene.target is None or scene.motions[0].p is None else {"p": _target(scene)},
+        "target": None if scene.target is None else _target(scene.target, _AXES if first.p is None else 1.6 * size),
         "cones": [
             {"axis": list(o.parameters()[:3]), "direction": list(o.parameters()[3:6]), "angle": float(o.half_angle)}
             for o in cones
@@ -157,11 +157,15 @@ def _legend(scene: Scene, first: Motion) -> str:
     if len(scene.motions) > 1 and len(scene.names) > 1:
         what += f"; solid {scene.names[0]}, dashed {scene.names[1]}"
     turn = "" if first.kind == "plane" else " Drag to turn, pinch or wheel to zoom."
-    return f"{what}.{turn}"
+    dragged = bool(scene.solver) and first.kind in ("rotation", "plane")  # the page says so itself where it can be
+    target = " Dashed: the target." if scene.target is not None and first.kind != "point" and not dragged else ""
+    return f"{what}.{turn}{target}"
 
 
-def _target(scene: Scene) -> list[float]:
-    return [float(x) for x in np.asarray(scene.target)]
+def _target(target: Motion, axes: float) -> dict[str, Any]:
+    """Where the plan is to end: its axes, of a point none."""
+    p = np.zeros((1, 3)) if target.p is None else target.p
+    return {"R": target.R[0].ravel().tolist(), "p": p[0].tolist(), "axes": 0.0 if target.kind == "point" else axes}
 
 
 def _finite(column: Array) -> list[float | None]:

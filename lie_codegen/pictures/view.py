@@ -135,7 +135,6 @@ def _of_plan(plan: Plan, group: Any, samples: int) -> Scene:
     X = plan.X(t)
     labels = list(plan.controls) if all(isinstance(name, str) for name in plan.controls) else []
     inputs = plan.inputs(t)
-    end = motion_of(plan.group, np.asarray(plan.target)[None]).p
     names = labels if len(labels) == inputs.shape[1] else [f"u{i + 1}" for i in range(inputs.shape[1])]
     units = {plan.group.units[plan.group.labels.index(name)] for name in names if name in plan.group.labels}
     unit = f"{units.pop()}/s" if len(units) == 1 and "" not in units else ""
@@ -151,7 +150,7 @@ def _of_plan(plan: Plan, group: Any, samples: int) -> Scene:
             ("cost", f"{plan.cost:.9g}"),
             ("error at the end", f"{plan.error:.3g}"),
         ],
-        target=None if end is None else end[0],
+        target=motion_of(plan.group, np.asarray(plan.target)[None]),
     )
 
 

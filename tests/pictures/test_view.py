@@ -310,3 +310,13 @@ def test_a_dragged_target_far_round_and_past_the_rim(solved: tuple[str, Path], t
         for i in range(3):
             assert float(tab.locator(f"#target_{i}").input_value()) == pytest.approx(x[i], abs=0.00501)
     assert largest > 1.5
+
+
+def test_the_target_of_a_plan_is_drawn_where_it_is(tmp_path: Path) -> None:
+    """The page's numbers: axes and place of the target, and the words that say what is dashed."""
+    goal = np.array([[0.0, -1.0, 2.0], [1.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
+    data = data_of(lc.view(lc.steer("se2", goal, ("omega", "vx"), 4.0), tmp_path / "p.html", samples=11))
+    target = data["target"]
+    np.testing.assert_allclose(np.reshape(target["R"], (3, 3))[:2, :2], goal[:2, :2], atol=1e-15)
+    np.testing.assert_allclose(target["p"], [2.0, 0.5, 0.0], atol=1e-15)
+    assert "Dashed: the target." in data["legend"]
