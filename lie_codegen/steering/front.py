@@ -140,7 +140,7 @@ def steer(
         iterations: iterations of a descent; 150 (direct).
         seed: of the random starts or the noise; 0 (direct, ocp, feedback).
         guess: controls to start from beside the others: a Plan of any method, (k, m) samples at equal times, a function of t, a path
-            (k, d, d) at equal times or (path, times); none.
+            (k, d, d) at equal times or (path, times); none (direct, transcription; optimal: their nearest extremal).
         polish: continuous controls after the constant pieces; True (direct).
         equation: "left" (default), X' = X hat(u), or "right", X' = hat(u) X (direct).
         spread: systems {"drift": ..., "gain": ...} that the controls shall serve alike; none (direct).

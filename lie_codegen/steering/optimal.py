@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,7 @@ from lie_codegen.steering.finish import energy, flown_end
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import SOLVED, Extremals
+from lie_codegen.steering.shooting.from_guess import nearest_costate
 from lie_codegen.steering.shooting.shooter import Shooter, shooter
 from lie_codegen.steering.shooting.transversal import Met, focal_times, met
 from lie_codegen.steering.task import Task
@@ -36,6 +38,8 @@ _MORE = 10
 _LONELY = 2
 _CONJUGATE = 1e-6
 _CLOSE = 0.01
+#: Intervals at which a guess is looked at.
+_GUESSED = 96
 #: Elements of a set of goals, beside the one given, whose extremals are begun from.
 _ELSEWHERE = 2
 
@@ -46,6 +50,7 @@ def optimal(
     weights: ArrayLike | None = None,
     starts: int | None = None,
     threads: int = 1,
+    guess: Any = None,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """The minimum-energy manoeuvre, the best of several starts.
@@ -55,6 +60,7 @@ def optimal(
         weights: (m,) positive w_i, ones if not given.
         starts: first guesses; None for the number the solver was tuned with.
         threads: not used for one target; see `Shooter.solve` for batches.
+        guess: controls whose nearest extremal is one start more: a Plan, (k, m) samples, a function of t, a path.
         progress: called with one line a stage.
 
     Raises:
@@ -68,8 +74,14 @@ def optimal(
     solver = shooter(task.group, task.controls)
     w = solver.check_weights(weights)
     built = time.perf_counter()
+    mu0 = None
+    if guess is not None:
+        from lie_codegen.steering.transcription.guess import given_guess
+
+        velocities = given_guess(task, _GUESSED, np.zeros(task.group.dim), guess)
+        mu0 = nearest_costate(task.group, task.controls, velocities, w)
     if task.free is not None:
-        return _to_a_set(task, solver, w, starts, built - started, say)
+        return _to_a_set(task, solver, w, starts, mu0, built - started, say)
     tried: list[str] = []
     first = solver.starts if starts is None else starts
     best: Extremals | None = None
@@ -81,6 +93,17 @@ def optimal(
             best = found if best is None or found.cost[0] < best.cost[0] else best
             if starts is not None or found.agreeing[0] > _LONELY:
                 break
+    own = (
+        None
+        if mu0 is None
+        else met(lambda mu: solver.extremal(mu, weights=w), mu0, task.target, np.zeros((0, len(mu0))))
+    )
+    if own is not None:
+        cost = _cost(task, own, w)
+        tried.append(f"the guess given: an extremal of cost {cost / task.duration:.6g}, miss {own.miss:.1e}")
+        say(tried[-1])
+        if own.converged and (best is None or cost < float(best.cost[0])):
+            best = _of_met(found if best is None else best, own, cost)
     if best is not None:
         seconds = {"build": built - started, "solve": time.perf_counter() - built}
         return _plan(task, solver, best, w, tuple(tried), seconds)
@@ -90,11 +113,17 @@ def optimal(
     from lie_codegen.steering.transcription.transcribe import least_energy
 
     say("shooting failed: transcription")
-    return least_energy(task, weights=w, tried=tuple(tried), progress=progress)
+    return least_energy(task, weights=w, guess=guess, tried=tuple(tried), progress=progress)
 
 
 def _to_a_set(
-    task: Task, solver: Shooter, weights: Array, starts: int | None, build: float, say: Callable[[str], None]
+    task: Task,
+    solver: Shooter,
+    weights: Array,
+    starts: int | None,
+    guess: Array | None,
+    build: float,
+    say: Callable[[str], None],
 ) -> Plan:
     """The cheapest extremal that meets the set transversally, from the extremals to its element given and to others of it."""
     if task.free is None:
@@ -104,29 +133,38 @@ def _to_a_set(
     best: tuple[float, Met, Extremals] | None = None
     for number, element in enumerate(task.elements(_ELSEWHERE), start=1):
         shot = solver.solve(element, weights=weights, starts=starts)
-        ends = met(lambda mu0: solver.extremal(mu0, weights=weights), shot.mu0[0], element, task.free)
-        cost = float(np.sum(ends.extremal.mu0[list(task.controls)] ** 2 / weights))
-        tried.append(
-            f"shooting to element {number} of the set, {shot.converged[0]} starts converged; along the set to cost "
-            f"{cost / task.duration:.6g}, miss {ends.miss:.1e}, transversality {ends.transversality:.1e}"
-        )
-        say(tried[-1])
-        if ends.converged and (best is None or cost < best[0]):
-            best = cost, ends, shot
+        begun = [(f"shooting to element {number} of the set, {shot.converged[0]} starts converged", shot.mu0[0])]
+        if guess is not None and number == 1:
+            begun.append(("the guess given", guess))
+        for name, mu0 in begun:
+            ends = met(lambda mu: solver.extremal(mu, weights=weights), mu0, element, task.free)
+            cost = _cost(task, ends, weights)
+            tried.append(
+                f"{name}; along the set to cost {cost / task.duration:.6g}, miss {ends.miss:.1e}, transversality "
+                f"{ends.transversality:.1e}"
+            )
+            say(tried[-1])
+            if ends.converged and (best is None or cost < best[0]):
+                best = cost, ends, shot
     if best is None:
         raise SteeringError(
             f"steer({task.group.name}): no extremal found that meets the set of goals transversally, which proves nothing: "
             f'{"; ".join(tried)}; more starts, or method="direct"'
         )
     cost, ends, shot = best
-    found = replace(
-        shot,
-        mu0=ends.extremal.mu0[None],
-        cost=np.array([cost]),
-        residual=np.array([ends.miss]),
-    )
+    found = _of_met(shot, ends, cost)
     seconds = {"build": build, "solve": time.perf_counter() - began}
     return _plan(replace(task, target=ends.target), solver, found, weights, tuple(tried), seconds)
+
+
+def _cost(task: Task, ends: Met, weights: Array) -> float:
+    """Of an extremal, in unit time: its energy is constant."""
+    return float(np.sum(ends.extremal.mu0[list(task.controls)] ** 2 / weights))
+
+
+def _of_met(shot: Extremals, ends: Met, cost: float) -> Extremals:
+    """The record of a shot, with another extremal in it."""
+    return replace(shot, mu0=ends.extremal.mu0[None], cost=np.array([cost]), residual=np.array([ends.miss]))
 
 
 def _plan(

@@ -111,3 +111,21 @@ def test_a_path_with_times_is_the_same_motion_at_equal_times() -> None:
     path = path_of(so3, (given, 2 * t), "guess")
     assert path is not None
     np.testing.assert_allclose(path_velocities(so3, path, 0.25), np.tile(turn / 2, (8, 1)), atol=1e-12)
+
+
+def test_a_guess_of_the_optimal_method_is_an_extremal_more() -> None:
+    so3 = lc.group("so3")
+    target = expm(so3.hat([0.5, -0.8, 1.1]))
+    best = lc.steer(so3, target, ("w1", "w2"), 2.0, method="optimal")
+    for guess in (best, best.u(np.linspace(0, 2, 41))[:, :2], lambda t: best.u(t)[:2], best.X(np.linspace(0, 2, 41))):
+        again = lc.steer(so3, target, ("w1", "w2"), 2.0, method="optimal", guess=guess)
+        told = [line for line in again.details["tried"] if line.startswith("the guess given")]
+        assert len(told) == 1
+        # it leads to the same extremal, whose residual is told
+        assert float(told[0].split("cost ")[1].split(",")[0]) == pytest.approx(best.cost, rel=1e-5)
+        assert float(told[0].split("miss ")[1]) < 1e-10
+        assert again.cost == pytest.approx(best.cost, rel=1e-9)
+    with pytest.raises(lc.errors.ShapeError, match="guess"):
+        lc.steer(so3, target, ("w1", "w2"), 2.0, method="optimal", guess=np.zeros((5, 3)))
+    aimed = lc.steer(so3, lc.Pointing((1, 0, 0), (0, 1, 0)), ("w1", "w2"), 2.0, method="optimal", guess=best)
+    assert any(line.startswith("the guess given") for line in aimed.details["tried"])

@@ -28,22 +28,22 @@ _COARSE = 4
 _LOOSE = 1e-10
 
 
-def given_guess(task: Task, structure: Structure, numbers: Numbers, guess: Any) -> Array:
-    """The caller's controls as velocities (N + 1, m) in unit time: of a plan, or samples (k, m) at equal times.
+def given_guess(task: Task, intervals: int, drift: Array, guess: Any) -> Array:
+    """The caller's controls as velocities (N + 1, m) in unit time, beside the drift: of a plan, or samples (k, m) at equal times.
 
     Raises:
         ShapeError, NotFiniteError: about the guess.
     """
-    m, where = len(structure.controls), f"steer({task.group.name}): guess"
-    s = np.linspace(0, 1, structure.intervals + 1)
+    m, where = len(task.controls), f"steer({task.group.name}): guess"
+    s = np.linspace(0, 1, intervals + 1)
     if isinstance(guess, Plan):
-        values = guess.u(s * guess.duration)[:, list(structure.controls)] * guess.duration
+        values = guess.u(s * guess.duration)[:, list(task.controls)] * guess.duration
     elif callable(guess):
         values = np.array([np.asarray(guess(float(t)), dtype=float) for t in s * task.duration]) * task.duration
     elif (path := path_of(task.group, guess, where)) is not None:
-        rates = path_velocities(task.group, path, 1 / (len(path) - 1)) - numbers.drift
+        rates = path_velocities(task.group, path, 1 / (len(path) - 1)) - drift
         middle = (np.arange(len(rates)) + 0.5) / len(rates)
-        values = np.column_stack([np.interp(s, middle, rates[:, i]) for i in structure.controls])
+        values = np.column_stack([np.interp(s, middle, rates[:, i]) for i in task.controls])
     else:
         samples = np.asarray(guess, dtype=float)
         if samples.ndim != 2 or samples.shape[1] != m or len(samples) < 2:

@@ -66,11 +66,12 @@ def least_energy(
     task: Task,
     *,
     weights: ArrayLike | None = None,
+    guess: Any = None,
     tried: tuple[str, ...] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Minimum energy without constraints, where shooting failed."""
-    return _run(task, Options(weights=weights, starts=_FALLBACK), "optimal", tried, progress)
+    return _run(task, Options(weights=weights, starts=_FALLBACK, guess=guess), "optimal", tried, progress)
 
 
 def _run(
@@ -149,7 +150,7 @@ def _guesses(bench: Workbench, asked: Options) -> Iterator[tuple[str, Array]]:
     """The caller's own, and the others."""
     yield from guesses(bench.task, bench.structure, bench.numbers, asked.starts)
     if asked.guess is not None:
-        yield "the guess given", given_guess(bench.task, bench.structure, bench.numbers, asked.guess)
+        yield "the guess given", given_guess(bench.task, bench.structure.intervals, bench.numbers.drift, asked.guess)
 
 
 def _plan(
