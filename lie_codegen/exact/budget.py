@@ -96,7 +96,9 @@ class Meter:
 
 
 def complaint(value: sp.Expr) -> str | None:
-    """Why a number is over the budget, or None; a formula of symbols is bounded in its digits alone."""
+    """Why a number, or an entry of a matrix, is over the budget, or None; a formula of symbols is bounded in its digits alone."""
+    if isinstance(value, sp.MatrixBase):
+        return next(filter(None, map(complaint, value.flat())), None)
     if digits(value) > current_budget().digits:
         return over("digits", "a number has too many digits")
     if value.is_Rational or value.free_symbols:

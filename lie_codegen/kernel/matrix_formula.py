@@ -1,29 +1,23 @@
-"""Formulas of matrices as text: "tr(K1*(1 - Xd^-1*X))/2 + norm2(X' * b)/2".
-
-    sum    := term (('+' | '-') term)*
-    term   := factor (('*' | '/') factor)*
-    factor := ('+' | '-') factor | power
-    power  := postfix ('^' integer)?
-    postfix:= atom "'"*                     (transpose)
-    atom   := number | name | function '(' sum ')' | '(' sum ')'
+"""Formulas of matrices as text: "tr(K1*(1 - Xd^-1*X))/2 + norm2(X' * b)/2", in the grammar of `exact.expression`.
 
 tr is the trace, norm2 the sum of squares of all entries (of a number its square), skew(A) = (A - A')/2; log of a matrix is known for
 the products that the caller names, and vee of such a log is its (n, 1) coordinates; a number standing where a matrix is needed is that
-multiple of the identity. X^-1 and Xd^-1 are known; nothing else can be inverted. The text is data,
-never evaluated.
+multiple of the identity. X^-1 and Xd^-1 are known; nothing else can be inverted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from lie_codegen.errors import ExpressionError
-from lie_codegen.exact.expression import FORMULA_FUNCTIONS
-from lie_codegen.exact.token_stream import Token, TokenStream
+from lie_codegen.exact.expression import FORMULA_FUNCTIONS, Numbers, Parser
 from lie_codegen.on_demand import sympy as sp
 
 _MAX_EXPONENT = 16
+_OF_MATRICES = ("tr", "norm2", "skew")
+_INVERSES = {"X": "Xi", "Xd": "Xdi"}
 
 Value = Any  # sp.Expr or sp.ImmutableMatrix
 
@@ -50,7 +44,9 @@ def formula(
     Raises:
         ExpressionError: outside the grammar, an unknown name, or shapes that do not fit.
     """
-    return _Parser(text, matrices, names, values, hermitian=hermitian, logs=logs).parse()
+    functions = {name: function for name, function in FORMULA_FUNCTIONS.items() if name != "atan2"}
+    known = {**names, "pi": sp.pi, **values, **{name: matrices[name] for name in _INVERSES if name in matrices}}
+    return Parser(text, Matrices(known, functions, {}, matrices, tuple(sorted(values)), hermitian, tuple(logs))).parse()
 
 
 def scalar_formula(
@@ -88,170 +84,114 @@ def matrix_formula(
     Raises:
         ExpressionError: outside the grammar, or a scalar as the result.
     """
-    value = _Parser(text, matrices, names, values, logs=logs).parse()
+    value = formula(text, matrices, names, values, logs=logs)
     if not isinstance(value, sp.MatrixBase):
         raise ExpressionError(f"{text!r} is a number, not a matrix")
     return sp.ImmutableMatrix(value)
 
 
-class _Parser(TokenStream):
-    """Recursive descent; one instance a text."""
+@dataclass(frozen=True)
+class Matrices(Numbers):
+    """What the parts of a text mean where names may stand for matrices.
 
-    def __init__(
-        self,
-        text: str,
-        matrices: Mapping[str, sp.ImmutableMatrix],
-        names: Mapping[str, sp.Expr],
-        values: Mapping[str, Any],
-        *,
-        hermitian: bool = False,
-        logs: Sequence[MatrixLog] = (),
-    ) -> None:
-        super().__init__(text, "'")
-        self.hermitian, self.logs = hermitian, logs
-        self.matrices = matrices
-        self.values = sorted(values)
-        self.names: dict[str, Value] = {**names, "pi": sp.pi, **values}
-        for name in ("X", "Xd"):
-            if name in matrices:
-                self.names[name] = matrices[name]
+    Attributes:
+        matrices: X, Xd and their inverses Xi, Xdi.
+        values: names of the caller's numbers and matrices, for the message.
+        hermitian: norm2 sums squared moduli.
+        logs: the products whose logarithms are known.
+    """
 
-    def parse(self) -> Value:
-        value = self.sum()
-        self.end()
-        return value
+    matrices: Mapping[str, sp.ImmutableMatrix]
+    values: tuple[str, ...]
+    hermitian: bool
+    logs: tuple[MatrixLog, ...]
 
-    def sum(self) -> Value:
-        self.deeper()
-        value = self.term()
-        while operator := self.accept("+", "-"):
-            token = self.token
-            other = self.term()
-            value, other = self.aligned(value, other, token)
-            value = value + other if operator == "+" else value - other
-        self.depth -= 1
-        return value
+    @property
+    def operators(self) -> str:
+        return "'"
 
-    def aligned(self, a: Value, b: Value, token: Token) -> tuple[Value, Value]:
-        if isinstance(a, sp.MatrixBase) and not isinstance(b, sp.MatrixBase):
-            b = sp.eye(a.rows) * b
-        elif isinstance(b, sp.MatrixBase) and not isinstance(a, sp.MatrixBase):
-            a = sp.eye(b.rows) * a
-        if isinstance(a, sp.MatrixBase) and a.shape != b.shape:
-            raise self.error(f"a {a.rows} x {a.cols} matrix and a {b.rows} x {b.cols} matrix cannot be added", token)
-        return a, b
+    def add(self, a: Value, b: Value) -> Value:
+        a, b = _aligned(a, b)
+        return a + b
 
-    def term(self) -> Value:
-        value = self.factor()
-        while operator := self.accept("*", "/"):
-            token = self.token
-            other = self.factor()
-            if operator == "/":
-                if isinstance(other, sp.MatrixBase) or other.is_zero:
-                    raise self.error("only a number other than 0 can divide", token)
-                value = value / other
-            elif isinstance(value, sp.MatrixBase) and isinstance(other, sp.MatrixBase):
-                if value.cols != other.rows:
-                    raise self.error(
-                        f"{value.rows} x {value.cols} times {other.rows} x {other.cols} has no meaning", token
-                    )
-                value = value * other
-            else:
-                value = value * other
-        return value
+    def subtract(self, a: Value, b: Value) -> Value:
+        a, b = _aligned(a, b)
+        return a - b
 
-    def factor(self) -> Value:
-        sign = 1
-        while operator := self.accept("+", "-"):
-            sign = -sign if operator == "-" else sign
-        value = self.power()
-        return -value if sign < 0 else value
+    def multiply(self, a: Value, b: Value) -> Value:
+        if isinstance(a, sp.MatrixBase) and isinstance(b, sp.MatrixBase) and a.cols != b.rows:
+            raise ExpressionError(f"{a.rows} x {a.cols} times {b.rows} x {b.cols} has no meaning")
+        return a * b
 
-    def power(self) -> Value:
-        start = self.index
-        value = self.postfix()
-        if self.accept("^", "**") is None:
-            return value
-        sign = -1 if self.accept("-") else 1
-        token = self.token
-        if token.kind != "number" or not token.text.isdigit() or int(token.text) > _MAX_EXPONENT:
-            raise self.error(f"an exponent must be an integer of at most {_MAX_EXPONENT}", token)
-        self.index += 1
-        exponent = sign * int(token.text)
-        if not isinstance(value, sp.MatrixBase):
-            if exponent < 0 and value.is_zero:
-                raise self.error("only a number other than 0 can divide", token)
-            return value**exponent
-        if exponent >= 0:
-            return sp.ImmutableMatrix(value**exponent)
-        known = {"X": "Xi", "Xd": "Xdi"}
-        name = self.tokens[start].text
-        if exponent == -1 and self.index - start == 4 and name in known:
-            return self.matrices[known[name]]
-        raise self.error("of matrices only X^-1 and Xd^-1 are known inverses", self.tokens[start])
+    def divide(self, a: Value, b: Value) -> Value:
+        if isinstance(b, sp.MatrixBase) or b.is_zero:
+            raise ExpressionError("only a number other than 0 can divide")
+        return a / b
 
-    def postfix(self) -> Value:
-        value = self.atom()
-        while self.accept("'"):
-            value = value.T if isinstance(value, sp.MatrixBase) else value
-        return value
+    def power(self, base: Value, exponent: Value) -> Value:
+        if isinstance(exponent, sp.MatrixBase):
+            raise ExpressionError("an exponent must be an integer, not a matrix")
+        if not isinstance(base, sp.MatrixBase):
+            return super().power(base, exponent)
+        if exponent == -1:
+            for name in _INVERSES.keys() & self.matrices.keys():
+                if base == self.matrices[name]:
+                    return self.matrices[_INVERSES[name]]
+        if not (exponent.is_Integer and exponent >= -1 and exponent <= _MAX_EXPONENT):
+            raise ExpressionError(f"an exponent of a matrix must be an integer of at most {_MAX_EXPONENT}")
+        if exponent < 0:
+            raise ExpressionError("of matrices only X^-1 and Xd^-1 are known inverses")
+        if base.rows != base.cols:
+            raise ExpressionError(f"a {base.rows} x {base.cols} matrix has no powers")
+        return sp.ImmutableMatrix(base**exponent)
 
-    def atom(self) -> Value:
-        token = self.token
-        if token.kind == "number":
-            self.index += 1
-            return self.number(token)
-        if token.kind == "name":
-            self.index += 1
-            return self.call(token) if self.accept("(") else self.value(token)
-        if self.accept("("):
-            value = self.sum()
-            self.expect(")")
-            return value
-        raise self.error("the text ends too soon" if token.kind == "end" else f"{token.text!r} is not expected here")
+    def name(self, text: str) -> Value:
+        if text not in self.names:
+            known = ", ".join(["X", *(["Xd"] if "Xd" in self.names else []), *self.values, "entries as X11"])
+            raise ExpressionError(f"no name {text!r}; known: {known}")
+        return self.names[text]
 
-    def value(self, token: Token) -> Value:
-        if token.text in self.names:
-            return self.names[token.text]
-        known = ", ".join(["X", *(["Xd"] if "Xd" in self.names else []), *self.values, "entries as X11"])
-        raise self.error(f"no name {token.text!r}; known: {known}", token)
+    def call(self, text: str, arguments: Sequence[Value]) -> Value:
+        argument = arguments[0]
+        matrix = isinstance(argument, sp.MatrixBase)
+        if text == "norm2":
+            return sp.Add(*[self._square(entry) for entry in (argument.flat() if matrix else [argument])])
+        if text in _OF_MATRICES:
+            if not matrix or argument.rows != argument.cols:
+                raise ExpressionError(f"{text} takes a square matrix")
+            return argument.trace() if text == "tr" else (argument - argument.T) / 2
+        if text in ("log", "vee") and matrix:
+            return self._logarithm(text, argument)
+        if text not in self.functions:
+            known = ", ".join([*_OF_MATRICES, *sorted(self.functions)])
+            raise ExpressionError(f"no function {text!r}; known: {known}")
+        if matrix:
+            raise ExpressionError(f"{text} takes a number, not a matrix")
+        return super().call(text, arguments)
 
-    def square(self, entry: sp.Expr) -> sp.Expr:
+    def _square(self, entry: sp.Expr) -> sp.Expr:
         if not self.hermitian:
             return entry**2
         re, im = entry.as_real_imag()
         return re**2 + im**2
 
-    def call(self, token: Token) -> Value:
-        argument = self.sum()
-        self.expect(")")
-        if token.text in ("tr", "norm2", "skew"):
-            if not isinstance(argument, sp.MatrixBase):
-                if token.text == "norm2":
-                    return self.square(argument)
-                raise self.error(f"{token.text} takes a matrix", token)
-            if token.text == "norm2":
-                return sp.Add(*[self.square(entry) for entry in argument.flat()])
-            if argument.rows != argument.cols:
-                raise self.error(f"{token.text} takes a square matrix", token)
-            return argument.trace() if token.text == "tr" else (argument - argument.T) / 2
-        if token.text in ("log", "vee") and isinstance(argument, sp.MatrixBase):
-            return self.logarithm(token, argument)
-        function = FORMULA_FUNCTIONS.get(token.text)
-        if function is None or token.text == "atan2":
-            raise self.error(
-                f"no function {token.text!r}; known: tr, norm2, skew, {', '.join(sorted(FORMULA_FUNCTIONS))}", token
-            )
-        if isinstance(argument, sp.MatrixBase):
-            raise self.error(f"{token.text} takes a number, not a matrix", token)
-        return function(argument)
-
-    def logarithm(self, token: Token, argument: sp.MatrixBase) -> Value:
+    def _logarithm(self, text: str, argument: sp.MatrixBase) -> Value:
         """log of a product that the caller knows, or vee of such a log."""
         for each in self.logs:
-            if token.text == "log" and argument == each.product:
+            if text == "log" and argument == each.product:
                 return each.matrix
-            if token.text == "vee" and argument == each.matrix:
+            if text == "vee" and argument == each.matrix:
                 return each.coordinates
-        what = "log takes Xd^-1*X or X*Xd^-1" if token.text == "log" else "vee takes a log of these: vee(log(Xd^-1*X))"
-        raise self.error(f"of matrices {what}", token)
+        what = "log takes Xd^-1*X or X*Xd^-1" if text == "log" else "vee takes a log of these: vee(log(Xd^-1*X))"
+        raise ExpressionError(f"of matrices {what}")
+
+
+def _aligned(a: Value, b: Value) -> tuple[Value, Value]:
+    """Both matrices where one is: a number is that multiple of the identity."""
+    if isinstance(a, sp.MatrixBase) and not isinstance(b, sp.MatrixBase):
+        b = sp.eye(a.rows) * b
+    elif isinstance(b, sp.MatrixBase) and not isinstance(a, sp.MatrixBase):
+        a = sp.eye(b.rows) * a
+    if isinstance(a, sp.MatrixBase) and a.shape != b.shape:
+        raise ExpressionError(f"a {a.rows} x {a.cols} matrix and a {b.rows} x {b.cols} matrix cannot be added")
+    return a, b

@@ -13,6 +13,7 @@ from lie_codegen.kernel.matrix_formula import scalar_formula
 
 T, X = sp.symbols("t x")
 NAMES = {"t": T, "x": X, "pi": sp.pi}
+ELEMENT, INVERSE = (sp.ImmutableMatrix(2, 2, sp.symbols(f"{name}1:5")) for name in ("x", "y"))
 
 
 def formula(text: str) -> sp.Expr:
@@ -153,7 +154,31 @@ def test_arithmetic_agrees_with_python(case: tuple[str, float]) -> None:
     assert float(parse_number(text)) == value
 
 
-@pytest.mark.parametrize("text", ["1e999999999", "0^-1", "(" * 100 + "1" + ")" * 100, "", "2 $ 3", "1 +"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1e999999999",
+        "0^-1",
+        "(" * 100 + "1" + ")" * 100,
+        "",
+        "2 $ 3",
+        "1 +",
+        "log(0)",
+        "tr(log(0)*X)",
+        "X^-2",
+        "2^X",
+        "X'^-1",
+    ]
+    + ["(" * k + "9" + "^16)" * k for k in (4, 40)]
+    + ["norm2(10^60*(10^60*(10^60*(10^60*(10^60*(10^60*X))))))"],
+)
 def test_formulas_of_matrices_are_as_closed(text: str) -> None:
     with pytest.raises(ExpressionError, match="column"):
-        scalar_formula(text, {}, {}, {})
+        scalar_formula(text, {"X": ELEMENT, "Xi": INVERSE}, {}, {})
+
+
+def test_formulas_of_matrices_have_the_grammar_of_numbers() -> None:
+    known = {"X": ELEMENT, "Xi": INVERSE}
+    assert scalar_formula("2^3^2 + 2**-1", known, {}, {}) == 512 + sp.Rational(1, 2)
+    assert scalar_formula("tr((X)^-1*(2*X)')", known, {}, {}) == (INVERSE * 2 * ELEMENT.T).trace()
+    assert scalar_formula("(tr(X)^(1+1) - tr(X^2))/2", known, {}, {}).expand() == ELEMENT.det().expand()
