@@ -120,6 +120,7 @@ def phase_routine(name: str, namespace: str, node: Node, clock: Clock, size: int
     )  # fmt: skip
 
     def tangent(ops: Any, inputs: Sequence[Scalar], outputs: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
+        # The last input is the order, 1 or 2, which has no derivative.
         directions = [ops.constant(0) + each for each in rates[: size + 1]]
         return call_routine(ops, moved, [*inputs, *directions])
 

@@ -43,6 +43,7 @@ def connection_kernels(connection: ShapeForm, harmonics: int = 3, namespace: str
         evaluate = ExpressionEvaluator(ops, dict(zip(symbols, r, strict=True)))
         if connection.exact_A is not None:
             return [[evaluate(entry) for entry in row] for row in connection.exact_A.tolist()]
+        # No momentum means M_gg xi + M_gr r' = 0, and so A = M_gg^-1 M_gr: solved at each r, sparse, where a metric is given.
         M = sp.ImmutableMatrix(connection.exact_metric)
         block = {(i, j): evaluate(M[i, j]) for i in range(n) for j in range(n) if M[i, j] != 0}
         columns = [{i: evaluate(M[i, n + j]) for i in range(n) if M[i, n + j] != 0} for j in range(k)]
@@ -53,6 +54,7 @@ def connection_kernels(connection: ShapeForm, harmonics: int = 3, namespace: str
         """-A(r) r' at time t."""
         c, s = ops.cos(t), ops.sin(t)
         waves: list[tuple[Scalar, Scalar]] = [(1, 0), (c, s)]
+        # cos m t and sin m t by turning the pair of m - 1: one sine and one cosine a call.
         for _ in range(harmonics - 1):
             x, y = waves[-1]
             waves.append((x * c - y * s, y * c + x * s))
@@ -66,6 +68,7 @@ def connection_kernels(connection: ShapeForm, harmonics: int = 3, namespace: str
         return [product(-1, dot(row, moving)) for row in at(ops, r)]
 
     def step(ops: Arithmetic, X: Any, gait: Matrix, t: Scalar, h: Scalar) -> tuple[Any, ...]:
+        # Two Gauss-Legendre nodes; the bracket's sign is that of X' = X hat(xi), the opposite of the one printed for Y' = A Y.
         offset = 3**0.5 / 6
         first, second = (rate(ops, gait, t + h * (0.5 + sign * offset)) for sign in (-1, 1))
         turned = bracket(ops, group.algebra, first, second)

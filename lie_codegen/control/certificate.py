@@ -130,6 +130,7 @@ def certificate(
     moving, bound = not invariance(pair).left, float("inf")
     if moving:
         bound = 2.0 if reach is None else float(reach)
+    # b_1, b_2 and h belong to phi and to the level alone; how fast the reference turns enters the pointwise rate, so that speed is 0 here.
     search = LevelSearch(samples, body, level, 0.0, np.random.default_rng(seed), moving=moving, reach=bound)
     b_1, b_2 = quadratic_bounds(search, metric, stiffness)
     h, t = hessian_bound(search, metric), metric.turning()
@@ -150,6 +151,7 @@ def certificate(
     sure = float("nan")
     if feedforward == "levi_civita" and np.all(np.isfinite(proved)):
         sure = replace(theorem, b_1=proved[0], b_2=proved[1], h=proved[2], t=proved[3]).best(overshoot).rate
+    # Near rest the loop is theta'' = -I^-1 (H theta + K_d theta'): no rate of W, which is quadratic, can be above twice that of its slowest mode.
     slowest = np.linalg.eigvals(
         np.block([[np.zeros((n, n)), np.eye(n)], [-metric.inverse @ stiffness, -metric.inverse @ K_d]])
     )

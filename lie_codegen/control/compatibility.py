@@ -192,6 +192,7 @@ def _rational_factor(exponential: MatrixExponential, rng: random.Random, size: i
         raise ArithmeticError("this one-parameter subgroup has no rational points of a known kind")
     small = Fraction(rng.randint(-60, 60), 61)
     base = min((abs(r) for r in rates or frequencies), default=None)
+    # Rational points of the circle, and powers of a rational growth: the modes are rational though x is not, and the identity is checked without rounding.
     cosine, sine = (1 - small**2) / (1 + small**2), 2 * small / (1 + small**2)
     growth = Fraction(rng.randint(30, 90), 61)
     values: list[Fraction] = []

@@ -49,6 +49,7 @@ def loop_step(loop: Loop, name: str = "loop_step") -> Kernel:
                 *(x for each in now if each.kind == "vector" for x in changes[each.name]),
             ]
 
+        # The law is called once a stage: `pushed` leaves the rates of its own states here, and `rates` takes them up after it.
         changes: dict[str, Any] = {}
 
         def pushed(ops: Arithmetic, time: Scalar, Y: Any, eta: Vector, now: list[Own], stage: int) -> Vector:

@@ -74,6 +74,7 @@ def sampling(
         raise InputError(
             f"closed_loop: the times t are {gap:g} s apart, which is no multiple of sample = {sample:g}; choose t so that it is"
         )
+    # Exactly a part of the gap, so that the times t fall on calls to the last bit however 0.1 was rounded.
     sample = gap / count
     if delay is None:
         return sample, 0

@@ -208,6 +208,7 @@ def _check(manifold: Manifold, pair: _Pair) -> None:
         one, two = np.array(first(a, b), dtype=float), np.array(second(a, b), dtype=float)
         T = np.array(transport(a, b), dtype=float)
         x = manifold.along(b, rng.normal(size=N))
+        # The reference moves along the manifold, so that (A2) is asked along x, tangent at r, alone; what d_2 phi is across does not matter.
         size = max(size, float(np.linalg.norm(one) * np.linalg.norm(x)), float(np.linalg.norm(two) * np.linalg.norm(x)))
         worst = max(worst, abs(float((two + T.T @ one) @ x)))
         image = T @ x

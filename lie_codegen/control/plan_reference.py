@@ -176,6 +176,7 @@ def _refined(
     """Segments are halved until they meet the plan; those that round off a jump stay as they are."""
     derivation = GroupDerivation(group)
     inside = np.array([0.25, 0.5, 0.75])
+    # Kept by the ends of a segment: of the next round only the halves are new.
     rows: dict[tuple[float, float], NDArray[Any] | None] = {}
     while True:
         t = np.array(sorted(knots))

@@ -83,6 +83,7 @@ def check_reference(
     grid = np.linspace(t0, t1, samples + 1)
     values = [value(float(t)) for t in grid]
     changes = [float(np.max(np.abs(b - a))) for a, b in pairwise(values)]
+    # A jump keeps its size however close one looks, a steep place does not: the largest changes are bisected towards the half that changes more.
     for index in np.argsort(changes)[::-1][:8]:
         low, high, a, b = float(grid[index]), float(grid[index + 1]), values[index], values[index + 1]
         while high - low > _JUMP_WIDTH * (t1 - t0):

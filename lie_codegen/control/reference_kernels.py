@@ -211,7 +211,7 @@ def reference(
         formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n). Or the plan
             of a manoeuvre, as `steer` makes it: then the reference says its `error` and what it rounds off (`PlanReference`).
         plan: the same.
-        duration: with a plan without drift: the time [s] it is flown in, from rest to rest, X_d(t) = X(s(t)) with quintics s that stop
+        duration: with a plan without drift: the time [s] it takes, from rest to rest, X_d(t) = X(s(t)) with quintics s that stop
             wherever the plan's controls jump: nothing is rounded off.
         times, waypoints: (k,) and (k, d, d), instead of formulas; at rest at both ends.
         samples: (k, d, d) of a smooth curve at the times, in the place of waypoints: velocities and accelerations are those of

@@ -38,7 +38,7 @@ def generate(
     """The C package of a group, of kernels, of a plan, of a closed loop or of a controller of `lc.mpc`, or of several of these;
     written as a folder; returns its path.
 
-    A plan becomes <name>_plan.h and .c, its controls as a function of t, and <name>_plan_replay.c, which flies them and compares with
+    A plan becomes <name>_plan.h and .c, its controls as a function of t, and <name>_plan_replay.c, which runs them and compares with
     test vectors. A closed loop becomes its law with closed_loop.c, which runs it from the same start.
 
     Args:

@@ -26,7 +26,7 @@ class Complex:
         o = Complex.of(other)
         return Complex(self.re + o.re, self.im + o.im)
 
-    __radd__ = __add__
+    __radd__ = __add__  # addition commutes, entry by entry
 
     def __neg__(self) -> Complex:
         return Complex(-self.re, -self.im)
@@ -41,7 +41,7 @@ class Complex:
         o = Complex.of(other)
         return Complex(self.re * o.re - self.im * o.im, self.re * o.im + self.im * o.re)
 
-    __rmul__ = __mul__
+    __rmul__ = __mul__  # and so does the product of pairs of commuting scalars
 
     def __truediv__(self, other: Any) -> Complex:
         o = Complex.of(other)

@@ -121,6 +121,7 @@ def series_kernels(fields: LagrangianSeries, namespace: str) -> tuple[Kernel, ..
     def rate(ops: Arithmetic, given: Any, state: Vector, small: Scalar) -> Vector:
         evaluate, point = ExpressionEvaluator(ops, dict(given)), at(ops, given, state)
         total: Vector = [0] * n
+        # Horner's rule in eps: Z_1 + eps (Z_2 + eps (Z_3 + ...)).
         for terms in reversed(series.rates):
             total = plus(scaled(small, total), point.sum({w: evaluate(c) for w, c in terms.items()}))
         return total

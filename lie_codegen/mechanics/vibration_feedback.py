@@ -98,12 +98,15 @@ def vibration_feedback(
             c = parts[m + i]
             if isinstance(c, int) and c == 0:
                 continue
+            # One frequency a pair: the product of sines of two frequencies has no mean, so that pairs do not push each other.
             turning = ops.constant(omega * (2 * i + 1))
+            # The velocities p sin and q sin have a mean product p q / 2, and the averaged force is minus that times <Y_a : Y_b>: p q = -2 c.
             p = ops.sqrt(2 * ops.fabs(c))
             q = ops.where(ops.less(c, 0.0), p, -p)
             wave = turning * ops.cos(turning * s)
             for force, size in ((a, p), (b, q)):
                 u[force] = add(u[force], size * wave)
+                # Each oscillation also pushes along <Y_a : Y_a> by -size^2 / 4, which lies in the span of the controls: they take it back.
                 for k, factor in enumerate(back[force]):
                     if abs(factor) > 1e-14:
                         u[k] = add(u[k], ops.constant(factor / 4) * size * size)

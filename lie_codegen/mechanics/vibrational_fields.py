@@ -153,6 +153,7 @@ class VibrationalFields(Saved):
 
     def _second(self) -> Field:
         U, indices, state = self.primitives, range(len(self.lifts)), self.state
+        # Primitives without mean; or integrals from 0, so that the averaged state is the actual one at t = 0.
         if self.gauge == "zero_mean":
             integrals = [u.primitive() for u in U]
             single: list[sp.Expr] = [sp.S.Zero] * len(U)

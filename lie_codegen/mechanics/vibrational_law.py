@@ -70,6 +70,7 @@ def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int 
             return named["actual"].evaluate(ops, plus(y, change), tau + c * fast, design.eps, *given)[0]
 
         end = plus(y, increment(vectors(ops), CLASSICAL, slope, [0] * n, h))
+        # j is a whole number held in a double: halves between them tell one from the next whatever the rounding.
         last = ops.less(steps - 1.5, j)
         return ([*end, *alpha, ops.where(last, 0.0 * j, j + 1)],)
 

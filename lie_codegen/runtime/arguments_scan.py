@@ -38,6 +38,7 @@ def loops(signature: Signature, values: Sequence[Any], steps: int) -> tuple[list
                 f"{signature.name}.scan_batch: {port.name} has shape {port.shape}, (T{inner}{'' if inner else ','}) "
                 f"for T trajectories{both}; given {array.shape}"
             )
+        # An axis of length 1 stands for all trajectories, but the starts are as many as they are.
         if lead and (lead[0] != 1 or number == 0):
             if count is not None and lead[0] != count:
                 raise ShapeError(
@@ -45,6 +46,7 @@ def loops(signature: Signature, values: Sequence[Any], steps: int) -> tuple[list
                 )
             count, first = lead[0], first or port.name
         moves = lead[1] if len(lead) == 2 else 1
+        # A stride of 0 reads the same entries for every trajectory, or step: nothing is copied.
         strides.append(
             (
                 port.size * moves if lead and lead[0] != 1 else 0,

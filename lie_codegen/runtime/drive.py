@@ -167,6 +167,7 @@ def _plan(
     if not driven:
         raise InputError(f"{name}: none of its inputs is among {', '.join(at)}; say with at= which ones read u(t)")
     _check_driven(name, ports, driven, u.dim, at, others)
+    # The loop gives h and t itself, unless the caller does.
     clock = {each: _find(ports, each) if each not in others else -1 for each in ("h", "t")}
     points = sorted(set(driven.values()))
     given = np.asarray(start)

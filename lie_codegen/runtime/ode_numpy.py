@@ -56,12 +56,15 @@ def run(
     while times[-1] != t1:
         t, y = times[-1], states[-1]
         h = math.copysign(min(abs(h), longest), h)
+        # A step that would end a hair before t1 is stretched to it: what is left would be a step made of rounding.
         reached = t1 if abs(t1 - t) <= abs(h) * (1 + 1e-10) else t + h
+        # About twenty units in the last place of t: the time stands still. Written so that NaN ends here too.
         if not abs(reached - t) > 4e-15 * abs(t):
             return np.array(times), np.array(states), _STUCK, -1, count
         after, k = _step(f, t, y, reached - t, slope)
         count += len(_B)
         error = _error(y, after, reached - t, k, rtol, atol)
+        # After a refusal the next step may not grow: the estimate has just been wrong once.
         if error >= 1:
             h, grow = (reached - t) * (max(0.2, 0.9 * error ** (-1 / 8)) if math.isfinite(error) else 0.2), 1.0
             continue

@@ -113,11 +113,13 @@ def resolve_function(
     while len(left):
         values = _read(u, left, right, where)
         evaluations += values.shape[0] * values.shape[1]
+        # Legendre coefficients by quadrature at the Gauss nodes; two places that took no part in them check the sum.
         series = np.einsum("kg,pgi->pki", _TO_SERIES, values[:, :TERMS])
         missed = np.max(np.abs(_TO_CHECKS @ series - values[:, TERMS:]), axis=(1, 2))
         good = _is_resolved(series, missed, left, right, tolerance / length, tolerance)
         state = state.with_more(left[good], right[good], series[good], missed[good])
         bad_left, bad_right = left[~good], right[~good]
+        # All pieces agree where u was read; what hides between the last node and an end of a piece shows as a gap between neighbours.
         if not len(bad_left):
             state, bad_left, bad_right = state.without_torn(inside, tolerance)
         middle = bad_left + (bad_right - bad_left) / 2

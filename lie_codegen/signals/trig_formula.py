@@ -101,14 +101,17 @@ def base_rate(rates: Sequence[sp.Expr], period: sp.Expr | None, where: str) -> s
                 f"{where}: the frequencies {first} and {rate} have no common period (their ratio {ratio} is not "
                 "rational); replace them by nearby commensurate ones"
             )
+    # The greatest common divisor of fractions p/q in lowest terms is gcd(p) / lcm(q).
     numerator = math.gcd(*(int(ratio.p) for ratio in ratios))
     denominator = math.lcm(*(int(ratio.q) for ratio in ratios))
     common = first * sp.Rational(numerator, denominator)
+    # The first rate may be negative, or a symbol with a minus sign.
     if common.could_extract_minus_sign():
         common = -common
     if period is None:
         return common
     multiple = sp.cancel(common * period / (2 * sp.pi))
+    # A period typed as a decimal, 6.283185307179586, is no exact multiple of 2 pi / common; one within its rounding is meant.
     if multiple.is_number and not multiple.is_Integer and period.is_Rational:
         nearest = round(float(multiple))
         if nearest and abs(float(multiple) / nearest - 1) < _SNAP:

@@ -85,6 +85,7 @@ def optimal(
     tried: list[str] = []
     first = solver.starts if starts is None else starts
     best: Extremals | None = None
+    # Ten times the starts only where nothing was found, or so few agree on the cheapest that a cheaper one may have been missed.
     for count in (first, first * _MORE):
         found = solver.solve(task.target, weights=w, starts=count, threads=threads)
         tried.append(f"shooting, {count} starts, {found.converged[0]} converged")
@@ -107,6 +108,7 @@ def optimal(
     if best is not None:
         seconds = {"build": built - started, "solve": time.perf_counter() - built}
         return _plan(task, solver, best, w, tuple(tried), seconds)
+    # Not converged by its own strict rule, yet a hundred times closer than was asked: transcription would not come nearer.
     if found.residual[0] <= _CLOSE * task.tolerance:
         seconds = {"build": built - started, "solve": time.perf_counter() - built}
         return _plan(task, solver, found, w, tuple(tried), seconds)

@@ -23,7 +23,7 @@ from lie_codegen.values import Value, settle
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
 PACKAGE = "lie_codegen.steering.plan_package"
-#: What flies a plan, the same.
+#: What simulates a plan, the same.
 PATH = "lie_codegen.steering.plan_path"
 #: Times beyond the ends, relative to the duration, that are rounding.
 _ROUNDING = 1e-9
@@ -307,7 +307,7 @@ class Plan(Saved):
         return text
 
     def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:
-        """The controls as C with a program that flies them, as `lc.generate(plan, folder)` writes them.
+        """The controls as C with a program that runs them, as `lc.generate(plan, folder)` writes them.
 
         Raises:
             InputError: no such form, or "fourier" of controls that are no Fourier series over the duration.

@@ -84,7 +84,7 @@ def simulated(
     if group != plan.group:
         raise InputError(f"simulate: the plan is one of {plan.group.name}, not of {group.name}")
     if np.ndim(eps) or eps != 1.0:
-        raise InputError(f"{where}: a plan is flown as it is; scaled, it is the input plan.u.scaled(eps)")
+        raise InputError(f"{where}: a plan is simulated as it is; scaled, it is the input plan.u.scaled(eps)")
     times = check_times(group, np.linspace(0.0, plan.duration, 101) if t is None else t)
     plan.u(times)  # refuses times outside
     details = plan.details

@@ -152,7 +152,7 @@ def test_what_cannot_be_flown_is_said() -> None:
     for words, arguments, named in (
         ("one of so3, not of se2", ("se2", plan), {}),
         (r"t = 1.6 is outside", (plan,), {"t": [0, 1.6]}),
-        ("flown as it is", (plan,), {"eps": 0.5}),
+        ("simulated as it is", (plan,), {"eps": 0.5}),
         ("give an input u", ("so3",), {"t": [0, 1]}),
         ("give the times t", ("so3", [1.0, 0, 0]), {}),
         ("rtol must be positive", (plan,), {"rtol": 0.0}),

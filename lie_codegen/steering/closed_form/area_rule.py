@@ -81,6 +81,7 @@ def area_rule(
     )
     best = averaged[0] if averaged and not exact else None
     tried = averaged[:_TRIED] or [family.fitted(u, s) for u in _optimum(task, s, first)]
+    # The averaged model only lands near the target: from its optima least energy is sought again under the exact endpoint, which Newton then meets.
     for c in tried if exact else ():
         c = _least_energy(family, c, lambda c: _exact_gap(family, task, c), low, high)
         c, off = _restored(family, task, c)

@@ -189,6 +189,7 @@ def _proximal(box: Box, u: Array, r: Array, J: Array, gap: Array, A: Array, rho:
     y = np.zeros(len(want))
     v, g, value, inside = primal(y)
     for _ in range(_NEWTON):
+        # A gap whose multiplier is zero and would fall takes no part: its row is not active.
         free = (y > limit) | (g > 0)
         if float(np.max(np.abs(np.where(free, g, 0.0)))) <= _ROUNDING:
             break

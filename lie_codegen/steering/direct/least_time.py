@@ -76,6 +76,7 @@ def least_time(
     for round_ in range(rounds):
         rng = np.random.default_rng([seed, round_, 11])
         long = _LONG * n * (1 + round_)
+        # Where arcs are long most optima have no control at zero: such words are tried for themselves, among many with zeros they would be rare.
         bangs = np.flatnonzero(np.all(letters != 0, axis=1))
         bangs = bangs if len(bangs) > 1 else np.arange(len(letters))
         for name, words in (
@@ -104,6 +105,7 @@ def least_time(
     ]
     best.sort(key=lambda each: each[0])
     best[0] = with_other_arcs(arcs, solver, velocities, limits, best[0], settings, longest)
+    # The shortest word that the simulated system confirms.
     for _, word, durations, variant in best[:_KEPT]:
         flown, sequence = _flown(task, letters, word, durations, variant)
         if flown.miss <= max(1e-9, 1e-2 * tolerance):

@@ -166,6 +166,7 @@ def _proximal(box: Box, fuel: bool, at: Lanes, y: Array, rho: Array) -> tuple[Ar
     want = np.einsum("lnc,lc->ln", at.J, at.u) - at.r
     scale = rho[:, None]
 
+    # The dual of a separable problem in a box: its gradient J v(y) - want is piecewise linear in y, so that Newton on it ends in a few steps.
     def primal(y: Array) -> tuple[Array, Array, Array]:
         z = np.einsum("lnc,ln->lc", at.J, y) / box.mass
         if fuel:
@@ -175,6 +176,7 @@ def _proximal(box: Box, fuel: bool, at: Lanes, y: Array, rho: Array) -> tuple[Ar
         else:
             rate = 1 / (box.weight + scale)
             v = (z + scale * at.u) * rate
+        # A control at its bound does not answer to y.
         rate = np.where((v > box.low) & (v < box.high), rate, 0)
         v = np.clip(v, box.low, box.high)
         return v, rate, np.einsum("lnc,lc->ln", at.J, v) - want
@@ -187,6 +189,7 @@ def _proximal(box: Box, fuel: bool, at: Lanes, y: Array, rho: Array) -> tuple[Ar
         if not np.any(open_):
             break
         H = (at.J * (rate / box.mass)[:, None, :]) @ np.swapaxes(at.J, 1, 2)
+        # H is singular where all controls of a row are at their bounds.
         H += (1e-10 * trace + 1e-300)[:, None, None] * np.eye(H.shape[1])
         step = -np.linalg.solve(H, F[..., None])[..., 0]
         moved = np.zeros(len(y), bool)

@@ -89,6 +89,7 @@ class InterpretedMachine(InterpretedLoop):
             return
         finished, last, stuck = False, np.inf, 0
         for attempt in range(outer):
+            # The first rounds need not be exact, for the multipliers still move.
             loose = max(tolerance, _LOOSE[attempt]) if conditions and attempt < len(_LOOSE) else tolerance
             self._inner(run, loose, most)
             self._violation(run)
@@ -98,8 +99,10 @@ class InterpretedMachine(InterpretedLoop):
             finished = bool(met and loose <= tolerance and w["iterations"] < most)
             if finished or w["iterations"] >= most:
                 break
+            # The penalty grows only while conditions are unmet; near a solution the multipliers alone do the rest.
             if not met:
                 w["rho"] = min(10 * w["rho"], _LARGEST_PENALTY)
+            # Three rounds in which the largest penalty does not halve the violation: no point near here meets the conditions.
             stuck = stuck + 1 if not met and w["violation"] > last / 2 and w["rho"] >= _LARGEST_PENALTY else 0
             if stuck == 3:
                 break

@@ -47,12 +47,14 @@ class InterpretedSweep(InterpretedMerit):
                 q, Q = q + weight * J.T @ g, Q + weight * J.T @ H @ J
                 if run.exact:
                     Q = Q + model.curvature(x, u, p, t, c * self.h, chain, weight * g[:nx])
+        # The value one step on, (w, W), is pulled back through the step: J^T W J alone is Gauss-Newton, the exact form adds w times the second derivative of the step.
         _, J, chain = model.linear_step(x, u, p, t, self.h)
         q, Q = q + J.T @ w, Q + J.T @ W @ J
         if run.exact:
             Q = Q + model.curvature(x, u, p, t, self.h, chain, w[:nx])
         g, G = model.path_jacobian(x, u, p, t, nv)
         lam, rho = run.space["lambda"][k][: len(g)], float(run.space["rho"])
+        # Augmented Lagrangian of g <= 0: (max(0, lambda + rho g)^2 - lambda^2) / (2 rho), whose second derivative lives where it is pressed.
         a = np.where(model.given(k), 0, np.maximum(0, lam + rho * g))
         value += float(np.sum(np.where(model.given(k), 0, a * a - lam * lam))) / (2 * rho)
         pressed = G[a > 0]

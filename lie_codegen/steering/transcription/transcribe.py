@@ -168,7 +168,7 @@ def _plan(
     duration = best.duration * task.duration
     group, flight, last = task.group, best.flight, best.solves[-1]
     if flight is None:
-        raise ValueError("an admissible candidate has flown")
+        raise ValueError("an admissible candidate has been simulated")
     a, b = values[:-1], values[1:]
     details: dict[str, Any] = {
         "winner": f"transcription from {last.start}",
