@@ -5,9 +5,15 @@ Libraries are compiled with -Og, in half the time and to the same numbers; `LIE_
 
 from __future__ import annotations
 
+import copy
+import multiprocessing
 import os
 import shutil
 import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +39,23 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def repository() -> Path:
     return Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def elsewhere() -> Iterator[Callable[[Any], list[Any]]]:
+    """What comes back of a value that went to a process of each start method, and through dask's serializer."""
+    from distributed.protocol import deserialize, serialize
+
+    with ExitStack() as stack, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*multi-threaded", DeprecationWarning)
+        contexts = [multiprocessing.get_context(start) for start in ("fork", "forkserver", "spawn")]
+        pools = [stack.enter_context(ProcessPoolExecutor(1, mp_context=context)) for context in contexts]
+
+        def back(value: Any) -> list[Any]:
+            sent = [pool.submit(copy.copy, value) for pool in pools]
+            return [*(each.result(120) for each in sent), deserialize(*serialize(value))]
+
+        yield back
 
 
 @pytest.fixture

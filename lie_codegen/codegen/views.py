@@ -60,7 +60,8 @@ class PortView:
 
 @dataclass(frozen=True)
 class StatementView:
-    """const <type> <name> = <expression>;
+    """const <type> <name> = <expression>; without a type, which the template chooses: C of double or float, CUDA, OpenCL. A statement over lanes is
+    another thing: it knows its type, a mask or numbers, may be skipped, and prints itself beside its twin: `lanes.LaneStatement`.
 
     A call of a routine leaves an array, of `results` numbers of `type_name`: <expression>(arguments, <name>), where `condition` holds if it
     has one.
@@ -76,7 +77,7 @@ class StatementView:
 
 @dataclass(frozen=True)
 class StoreView:
-    """<parameter>[entry] = <value>;"""
+    """<parameter>[entry] = <value>, by the name of a parameter or of the work; lanes store by the number of a port: `lanes.LaneStore`."""
 
     parameter: str
     entry: int

@@ -6,6 +6,7 @@ import json
 import pickle
 import shutil
 import subprocess
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -257,12 +258,14 @@ def test_what_is_missing_or_misshapen_is_refused_by_name() -> None:
         lc.mpc("quadrotor")  # type: ignore[arg-type]
 
 
-def test_a_controller_is_copied_where_it_stands() -> None:
+def test_a_controller_is_copied_where_it_stands(elsewhere: Callable[[Any], list[Any]]) -> None:
     controller = lc.mpc(regulator())
     controller.reset(X0=np.eye(3), q=2.0, Xd=rotation((0, 1.5, 0)))
     controller.step(np.eye(3))
-    twin = pickle.loads(pickle.dumps(controller))
-    np.testing.assert_array_equal(twin.step(rotation((0, 0.1, 0))), controller.step(rotation((0, 0.1, 0))))
+    twins = (pickle.loads(pickle.dumps(controller)), *elsewhere(controller))
+    wanted = controller.step(rotation((0, 0.1, 0)))
+    for twin in twins:
+        np.testing.assert_array_equal(twin.step(rotation((0, 0.1, 0))), wanted)
 
 
 def test_the_loop_of_the_front_door_with_noise_and_delay_is_reproducible() -> None:

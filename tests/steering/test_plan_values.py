@@ -8,6 +8,7 @@ import multiprocessing
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -32,17 +33,24 @@ METHODS = (
     "transcription",
     "feedback",
     "direct",
+    "ocp",
+    "sinusoids",
+    "symmetric_product",
 )
 
 
 def planned(method: str, target=G):
-    return lc.steer("so3", target, controls=("w1", "w2"), duration=4.0, method=method)
+    if method == "sinusoids":
+        return lc.steer("h3", target, controls=(0, 1), duration=4.0, method=method)
+    more = {"inertia": [1, 2, 3]} if method == "symmetric_product" else {}
+    return lc.steer("so3", target, controls=("w1", "w2"), duration=4.0, method=method, **more)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_plans_of_every_method_are_values(method: str, tmp_path: Path) -> None:
+def test_plans_of_every_method_are_values(method: str, tmp_path: Path, elsewhere: Callable[[Any], list[Any]]) -> None:
     plan = planned(method)
-    for twin in (pickle.loads(pickle.dumps(plan)), copy.copy(plan), copy.deepcopy(plan), replace(plan)):
+    twins = (pickle.loads(pickle.dumps(plan)), copy.copy(plan), copy.deepcopy(plan), replace(plan))
+    for twin in (*twins, *elsewhere(plan)):
         assert (twin == plan) is True
         assert hash(twin) == hash(plan)
     assert (plan == replace(plan, cost=plan.cost + 1)) is False

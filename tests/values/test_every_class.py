@@ -173,7 +173,7 @@ LONG = ("BoundCheck", "Gait", "SlowEquilibrium", "WheelPlan")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in (*SAVED, *OTHERS)]
 )
-def test_a_result_is_a_value(name: str, tmp_path: Path) -> None:
+def test_a_result_is_a_value(name: str, tmp_path: Path, elsewhere: Callable[[Any], list[Any]]) -> None:
     value, twin = ({**SAVED, **OTHERS}[name]() for _ in range(2))
     assert type(value).__name__ == name
     assert (value == twin) is True
@@ -181,7 +181,8 @@ def test_a_result_is_a_value(name: str, tmp_path: Path) -> None:
     assert hash(value) == hash(twin)
     assert len(repr(value).splitlines()) <= 10
     assert "array(" not in repr(value)
-    for again in (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value), replace(value)):
+    twins = (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value), replace(value))
+    for again in (*twins, *elsewhere(value)):
         assert (again == value) is True
     if name in SAVED:
         assert (lc.load(value.save(tmp_path / "value.npz")) == value) is True

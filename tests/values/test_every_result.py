@@ -109,7 +109,7 @@ OTHERS: dict[str, Callable[[], Any]] = {
 
 @pytest.mark.filterwarnings("ignore::lie_codegen.errors.AssumptionWarning")
 @pytest.mark.parametrize("name", [*SAVED, *OTHERS])
-def test_a_result_is_a_value(name: str, tmp_path: Path) -> None:
+def test_a_result_is_a_value(name: str, tmp_path: Path, elsewhere: Callable[[Any], list[Any]]) -> None:
     make = {**SAVED, **OTHERS}[name]
     value = make()
     assert (value == make()) is True
@@ -117,7 +117,7 @@ def test_a_result_is_a_value(name: str, tmp_path: Path) -> None:
     assert hash(value) == hash(make())
     assert len(repr(value).splitlines()) <= 10
     assert "array(" not in repr(value)
-    for twin in (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value)):
+    for twin in (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value), *elsewhere(value)):
         assert (twin == value) is True
     if name in SAVED:
         assert replace(value) == value
@@ -149,13 +149,6 @@ def test_a_kernel_goes_to_other_processes(start: str) -> None:
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context(start)) as pool:
         found = list(pool.map(exponential, [kernel] * 6, rows))
     np.testing.assert_array_equal(found, [kernel(x) for x in rows])
-
-
-@pytest.mark.parametrize("name", ["formulas", "average", "run", "library", "kernel", "loop"])
-def test_dask_carries_a_result(name: str) -> None:
-    protocol = pytest.importorskip("distributed.protocol")
-    value = {**SAVED, **OTHERS}[name]()
-    assert protocol.deserialize(*protocol.serialize(value)) == value
 
 
 def test_a_saved_input_drives_the_same_motion_in_a_fresh_process(tmp_path: Path) -> None:
