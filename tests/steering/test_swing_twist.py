@@ -78,3 +78,12 @@ def test_nearly_vanishing_coordinates_do_not_make_four_phases_race() -> None:
     plan = lc.steer(lc.group("so3"), (0.1, 1e-4, np.pi / 40), ("w1", "w2"), 24.0, method="four_phase")
     assert np.max(np.abs(plan.u(np.linspace(0, 24, 4001)))) < 0.2
     assert plan.error < 1e-3
+
+
+@pytest.mark.parametrize("goal", [(0, 0, 0.5), (0.3, 0, -0.5), (0, -0.2, 0.4), (0.3, 0, 0), (0, 0, 0)])
+def test_four_phases_reach_targets_whose_own_loops_enclose_nothing(goal: tuple[float, ...]) -> None:
+    plan = lc.steer("h3", goal, ("x", "y"), 2.0, method="four_phase")
+    assert plan.error < 1e-9
+    assert plan.details["winner"] == "four phases with free amplitude"
+    with pytest.raises(lc.errors.SteeringInputError, match="non-zero"):
+        lc.steer("h3", goal, ("x", "y"), 2.0, method="four_phase", amplitude="tied")

@@ -50,7 +50,8 @@ def four_phase(task: Task, *, q: int | None = None, form: str = "product", ampli
             45 degrees. More periods are more accurate and cost more energy.
         form: "product", coordinates of the second kind, or "single", the logarithm.
         amplitude: "tied": the paper's, whose loops have the size of gd_i and gd_j; "free": a line, circles, a line back, for any target, see
-            `free_amplitude`; "auto": the paper's, and the free one where that would take more than 16 periods and none were asked for; zero coordinates are refused.
+            `free_amplitude`; "auto": the paper's, and the free one where gd_i gd_j = 0, or where the paper's would take more than 16 periods and none were
+            asked for.
 
     Raises:
         SteeringInputError: where the scheme does not apply, with what to do instead.
@@ -61,8 +62,9 @@ def four_phase(task: Task, *, q: int | None = None, form: str = "product", ampli
         raise SteeringInputError(f'four_phase: amplitude is "auto", "tied" or "free", got {amplitude!r}')
     gd = _desired(task, (i, j, k), form)
     loop = math.pi * constant * gd[i] * gd[j]
-    fast = q is None and abs(gd[k]) > _MOST_PERIODS * abs(loop) > _MOST_PERIODS * _NEGLIGIBLE
-    if amplitude == "free" or (amplitude == "auto" and fast):
+    flat = abs(constant * gd[i] * gd[j]) <= _NEGLIGIBLE  # loops of the size of gd_i and gd_j enclose nothing
+    fast = q is None and abs(gd[k]) > _MOST_PERIODS * abs(loop)
+    if amplitude == "free" or (amplitude == "auto" and (flat or fast)):
         return _free(task, (i, j, k), constant, gd, form, 1 if q is None else q, started)
     q = _periods(task, q, gd[k], constant * gd[i] * gd[j])
     psi = math.atan(gd[k] / (math.pi * q * constant * gd[i] * gd[j])) if gd[k] else 0.0
