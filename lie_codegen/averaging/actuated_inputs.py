@@ -89,7 +89,11 @@ def oscillator_average(group: GroupLike, oscillator: PointMassOscillator, x_dot:
 
 
 def oscillator_areas(x_dot: PeriodicInput) -> sp.ImmutableMatrix:
-    """(3, 3) areax_ij(T); u_av = -2 alpha_m / T I_0^{-1} (areax_23, areax_31, areax_12)."""
+    """(3, 3) areax_ij(T), as `areas`; u_av = -2 alpha_m / T I_0^{-1} (areax_23, areax_31, areax_12).
+
+    Args:
+        x_dot: the three rates of the oscillators over one period T.
+    """
     return areas(x_dot)
 
 

@@ -17,7 +17,7 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 
 
 def areas(u: PeriodicInput) -> sp.ImmutableMatrix:
-    """(n, n) Area_ij, antisymmetric; exact where the input is. [u unit^2 time unit^2]"""
+    """(n, n) Area_ij = 1/2 int_0^T (ut_i u_j - ut_j u_i) dt, antisymmetric, ut = int_0^t u; exact where the input is. [u unit^2 time unit^2]"""
     n = u.dim
     pairs = list(combinations(range(n), 2))
     brackets = {pair: {n + p: sp.S.One} for p, pair in enumerate(pairs)}
@@ -33,7 +33,7 @@ def areas(u: PeriodicInput) -> sp.ImmutableMatrix:
 
 
 def moments(u: PeriodicInput) -> sp.ImmutableDenseNDimArray:
-    """(n, n, n) m_ijk, antisymmetric in i and j; exact where the input is. [u unit^3 time unit^3]"""
+    """(n, n, n) m_ijk = 1/3 int_0^T (ut_i u_j - ut_j u_i) ut_k dt, antisymmetric in i and j; exact where the input is. [u unit^3 time unit^3]"""
     n = u.dim
     pairs = list(combinations(range(n), 2))
     dim = n + len(pairs)

@@ -24,7 +24,7 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 
 
 def corollary_bound(delta: ArrayLike) -> NDArray[np.float64]:
-    """9 |cos delta - 1| + 7 |sin delta| + sin^2 delta."""
+    """9 |cos delta - 1| + 7 |sin delta| + sin^2 delta: (...) of angles delta (...) [rad]."""
     d = np.asarray(delta, dtype=float)
     return np.asarray(9 * np.abs(np.cos(d) - 1) + 7 * np.abs(np.sin(d)) + np.sin(d) ** 2)
 

@@ -89,6 +89,13 @@ def distance(group: GroupLike, X: ArrayLike, Y: ArrayLike) -> float:
     """|log(X^-1 Y)|, Euclidean in the basis: left-invariant; on SO(3) the angle of the rotation from X to Y.
 
     Where X^-1 Y has no logarithm in the algebra, the Frobenius norm of X^-1 Y - I stands in.
+
+    Args:
+        group: the group, its name or its file.
+        X, Y: (d, d) elements, which are not tested for being elements.
+
+    Raises:
+        ArgumentError: matrices of another size.
     """
     group = as_group(group, "distance")
     relative = np.linalg.solve(np.asarray(X), np.asarray(Y))

@@ -31,6 +31,10 @@ def element_coordinates(group: MatrixGroup, X: ArrayLike) -> Array:
 def second_kind(group: GroupLike, X: ArrayLike) -> Array:
     """g with exp(g_1 A_1) ... exp(g_n A_n) = X, the one nearest to 0 that Newton's method finds.
 
+    Args:
+        group: the group, its name or its file.
+        X: (d, d) element; g is (n,).
+
     Raises:
         NotOnGroupError: if none is found from 0, from log X, or from random starts.
     """

@@ -162,7 +162,14 @@ def _linearised(
 
 
 def linear_controllability(equilibrium: RelativeEquilibrium) -> LinearControllability:
-    """The rank test (34) at every root."""
+    """The rank test (34): rank [s^2 M + s C + K, B] = n at every root s of det(s^2 M + s C + K), all (n, n), B (n, m).
+
+    Args:
+        equilibrium: one of `relative_equilibria`, with its roots.
+
+    Returns:
+        The verdict, the roots, and at each the n-th singular value relative to the first; where it is lost, the direction that no input moves.
+    """
     e, n = equilibrium, len(equilibrium.q)
     smallest, reason = [], "rank [s^2 M + s C + K, B] is full at every root"
     controllable = True

@@ -98,7 +98,13 @@ def term_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kernel, ...
 
 @kernel_factory()
 def lagrangian_kernels(system: LagrangianSystem, namespace: str = "lagrangian") -> tuple[Kernel, ...]:
-    """rate(y, u, parameters...) -> y' = X(y) + Y_a(q) u^a, and energy(y, parameters...) -> kinetic plus potential."""
+    """rate(y, u, parameters...) -> y' = X(y) + Y_a(q) u^a, and energy(y, parameters...) -> kinetic plus potential.
+
+    Args:
+        system: n coordinates and m inputs: y is (2 n,), the coordinates before their rates; u is (m,) and left out where m = 0.
+            The parameters are scalar inputs in the system's order.
+        namespace: C identifier that begins the symbols.
+    """
     n, m = len(system.state), len(system.inputs)
     ports = [Port("y", (n,), description=", ".join(map(str, system.state)))]
     if m:

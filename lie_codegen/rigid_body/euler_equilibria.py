@@ -152,14 +152,29 @@ def _changes_sign(values: Array) -> Any:
 def limit_cycle_gains(k: float, first: float) -> tuple[float, float]:
     """(N_2, N_3) that make k a limit cycle without change of spin, given N_1, (36).
 
+    Args:
+        k: modulus of the cycle, from 0 up to but not 1.
+        first: N_1 [1/s]; the other two are in its unit.
+
+    Raises:
+        InputError: k is no modulus: below 0, 1 or more.
+
     Coded without cancellation: E - (1 - k^2) K = k^2 K (1 - S), E - K = -k^2 K S, E = K (1 - k^2 S).
     """
+    if not 0 <= k < 1:
+        raise InputError(f"limit_cycle_gains: k is a modulus, 0 <= k < 1, given {k!r}")
     mean = ladder(NumpyArithmetic(), np.float64(k)).S
     return float(-(1 - mean) / mean * first), float(k**2 * (1 - mean) / (1 - k**2 * mean) * first)
 
 
 def momentum_directions(flow: EulerAverage, k: float, count: int = 200) -> Array:
-    """(count, 3) points of the curve of modulus k on the momentum sphere, (12), along the paper's axes."""
+    """(count, 3) unit vectors: points of the curve of modulus k on the momentum sphere, (12), along the paper's axes.
+
+    Args:
+        flow: of which body.
+        k: the modulus, from 0 up to but not 1.
+        count: points, at equal phases, the first and the last the same.
+    """
     body = flow.body.model
     ops = NumpyArithmetic()
     at = jacobi(ops, np.linspace(0, 1, count), ladder(ops, np.float64(k)))

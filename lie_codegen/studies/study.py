@@ -211,6 +211,7 @@ def open_study(
     Args:
         store: the folder or URL.
         what, space: as `study` had them: needed to run samples again (`worst`, `replay`).
+        reduce: as `study` had it.
 
     Raises:
         InputError: no study there, or of another one.

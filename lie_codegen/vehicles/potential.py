@@ -59,10 +59,14 @@ class Potential:
 
 
 def damping_force(group: GroupLike, D: Any) -> ForceBody:
-    """-D xi, D symmetric and not negative.
+    """The body force -D xi, (n,), D symmetric and not negative, for `closed_loop(external=...)`.
+
+    Args:
+        group: the group, its name or its file.
+        D: a number, (n,) for a diagonal, or (n, n), in units of force over velocity.
 
     Raises:
-        InputError: D has a negative eigenvalue.
+        InputError: D has a negative eigenvalue. ShapeError: it is none of these shapes.
     """
     group = as_group(group, "damping_force")
     matrix = symmetric_matrix(D, group.dim, "damping")

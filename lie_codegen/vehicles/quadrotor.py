@@ -151,7 +151,16 @@ def flat_reference(position: Sequence[Any], heading: Any = 0, name: str = "flat_
 
 
 def quadrotor_force(law: Kernel, reference: Kernel, *, mass: Any, gravity: Any = GRAVITY) -> ForceBody:
-    """The body force (M, -f e_3 + m g R' e_3) of the law along a flat reference, for `closed_loop(external=...)`."""
+    """The body force (M, -f e_3 + m g R' e_3), (6,) [N m, N], of the law along a flat reference, for `closed_loop(external=...)`.
+
+    Args:
+        law: (X, xi, flat reference) -> (thrust f [N], moment M [N m], ...), as `quadrotor_law` makes it.
+        reference: t -> the flat reference, as `flat_reference` makes it.
+        mass: [kg]. gravity: [m/s^2].
+
+    Raises:
+        InputError: a mass or gravity that is not positive.
+    """
     m, g = positive_number(mass, "mass"), positive_number(gravity, "gravity")
 
     def force(ops: Arithmetic, t: Scalar, X: Matrix, xi: Vector) -> Vector:

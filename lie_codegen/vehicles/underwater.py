@@ -102,6 +102,15 @@ def underwater_vehicle(
 ) -> UnderwaterVehicle:
     """A vehicle from its parameters; buoyancy is the weight if not given (neutral).
 
+    Args:
+        group: SE(3) in the order w, v.
+        inertia, added: (6, 6), a diagonal or a number, of the body and of the water that moves with it [kg m^2, kg].
+        linear_damping: likewise, D of the force -D v, v the velocity through the water.
+        quadratic_damping: (6,), D_i of the force -D_i |v_i| v_i.
+        weight, buoyancy: [N], down and up.
+        r_G, r_B: (3,) centres of gravity and buoyancy in the body [m].
+        current: (3,) velocity of the water in the world [m/s].
+
     Each number may be "input": then it is an input of `underwater_kernel` and of a `compensated` law, of that name and behind the others,
     and its signs are not checked. The inertia is one of the law's: `vehicle.inertia` is "input" then, as the sum with "added" cannot be made.
 
@@ -165,7 +174,13 @@ def underwater_forces(vehicle: UnderwaterVehicle) -> ForceBody:
 
 @kernel_factory()
 def underwater_kernel(vehicle: UnderwaterVehicle, name: str = "underwater_forces") -> Kernel:
-    """(X, xi) -> force, to be cancelled by a law or added to a simulation."""
+    """(X (4, 4), xi (6,) [rad/s, m/s]) -> force (6,) [N m, N]: damping, weight and buoyancy, added mass in a current.
+
+    To be cancelled by a law or added to a simulation. Numbers of the vehicle that are "input" are further inputs, in its order.
+
+    Raises:
+        IdentifierError: a name that is no C identifier.
+    """
     return Kernel(
         name=name,
         namespace=vehicle.group.name,
@@ -184,7 +199,13 @@ def underwater_kernel(vehicle: UnderwaterVehicle, name: str = "underwater_forces
 
 @kernel_factory()
 def compensated(law: Kernel, vehicle: UnderwaterVehicle, name: str | None = None) -> Kernel:
-    """A tracking law on SE(3) with the vehicle's forces taken off: force - f(X, xi), so that the loop sees none of them."""
+    """A tracking law on SE(3) with the vehicle's forces taken off: force - f(X, xi), (6,) [N m, N], so that the loop sees none of them.
+
+    Args:
+        law: (X, xi, ...) -> (force, ...), as `tracking_law` makes it.
+        vehicle: whose forces f are; its numbers that are "input" are inputs of the new law, behind those of the old one.
+        name: C identifier, the law's own if None.
+    """
     count, sampler = len(law.inputs), law.sampler
 
     def body(ops: Arithmetic, X: Any, xi: Vector, *rest: Any) -> tuple[Any, ...]:

@@ -270,3 +270,9 @@ def test_refusals_say_why():
         solve_averaged(flow, 1.0, 0.6, [0, 3], 0.1)
     with pytest.raises(ComputationError, match="not smooth"):
         euler_average(body, ["abs(w1 + 0.1)", "0", "0"]).averaged(1.0, 0.5)
+
+
+@pytest.mark.parametrize("k", [-0.1, 1.0, 1.5])
+def test_gains_of_a_limit_cycle_need_a_modulus(k: float) -> None:
+    with pytest.raises(InputError, match="modulus"):
+        limit_cycle_gains(k, 1.0)
