@@ -1,0 +1,260 @@
+"""A task among obstacles: first controls along the ways around them, results on fine pieces that the true system confirms, their classes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.arrays import Array
+from lie_codegen.steering.constraints import Obstacle
+from lie_codegen.steering.direct.assemble import Manoeuvre, linear_pieces
+from lie_codegen.steering.direct.clear_search import Course, arrive, cheaper
+from lie_codegen.steering.direct.compiled import machine
+from lie_codegen.steering.direct.flight import fly
+from lie_codegen.steering.direct.inputs import Drive
+from lie_codegen.steering.direct.numpy_search import Lanes, Rows, reach
+from lie_codegen.steering.direct.polish import Flown, corrected
+from lie_codegen.steering.direct.programme import Settings
+from lie_codegen.steering.direct.starts import starts as first_controls
+from lie_codegen.steering.direct.starts import with_free_slots
+from lie_codegen.steering.obstacles.homotopy import Discs, planar_discs, resampled, shortest_classes
+from lie_codegen.steering.obstacles.keep_out import KeepOut
+from lie_codegen.steering.obstacles.path_guess import word_text
+from lie_codegen.steering.obstacles.roadmap import Places, Space, drawn_into, seen, ways
+from lie_codegen.steering.obstacles.tunnels import tunnels
+
+#: Pieces of linear controls of the search, and of the plan.
+_COARSE, _FINE = 24, 64
+#: Lanes that follow each way, random lanes that go by no way at least, those of them that descend, and results that are refined.
+_EACH, STRAIGHT, _OTHERS, _REFINED = 2, 2, 2, 4
+#: Costs of results on the coarse pieces that are taken for the same.
+_ALIKE = 1e-3
+#: Weight of a node's distance from the way beside the goal, and steps that follow it.
+_FOLLOW, _FOLLOWING = 0.2, 25
+#: Residual at which controls are there and clear.
+ENOUGH = 1e-9
+_WIDER, _AGAIN = 1.2, 6
+#: Largest motion between two looks, in units of the smallest obstacle; parts of a piece, at most.
+_LOOK, _MOST_PARTS = 0.05, 64
+#: Depth in an obstacle that is rounding.
+CLEAR = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Controls on the fine pieces, flown: what they cost, how near they come to the obstacles, and their way."""
+
+    flown: Flown
+    variant: int
+    cost: float
+    clearance: float
+    off: float
+    way: Places
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A task among obstacles."""
+
+    task: Manoeuvre
+    keep_out: KeepOut
+    obstacles: tuple[Obstacle, ...]
+    settings: Settings
+
+    @property
+    def discs(self) -> Discs | None:
+        """The obstacles as discs, where all of them are."""
+        return (
+            planar_discs(self.obstacles) if self.task.system.group.degree == 3 and np.all(self.keep_out.balls) else None
+        )
+
+    def goal_state(self, variant: int) -> Array | None:
+        """A state at the goal: one of many where it leaves motions free; None where only a part of it is known."""
+        end = self.task.end
+        if end.elements is not None:
+            return np.asarray(np.real(end.elements[variant]))
+        X, column = np.eye(self.task.system.group.degree), end.right[:, 0]
+        value = end.values[variant][:, 0] / np.max(np.abs(end.left))
+        if column[-1] == 1 and len(value) == len(X) - 1:
+            X[:-1, -1] = value
+            return X
+        return None
+
+    def first(
+        self, classes: int, seed: int, variant: int, straight: int, guesses: Array | None
+    ) -> tuple[Array, list[str]]:
+        """First controls on the coarse pieces (L, C), and where each comes from."""
+        nodes = _COARSE + 1
+        u = with_free_slots(self.task, first_controls(self.task, nodes, straight, seed, 0), seed)
+        flat = u.reshape(len(u), -1)
+        lanes, names = [flat], [f"start {number}" for number in range(1, len(u) + 1)]
+        if guesses is not None:
+            given = np.stack([_stretched(each, nodes) for each in guesses])
+            lanes.append(with_free_slots(self.task, given, seed).reshape(len(given), -1))
+            names += ["the guess given"] * len(given)
+        course = self.course(_COARSE, variant)
+        for number, way in enumerate(self.ways(classes, seed, variant), start=1):
+            again = first_controls(self.task, nodes, _EACH, seed, number)
+            begin = with_free_slots(self.task, again, seed).reshape(_EACH, -1)
+            lanes.append(self.following(course, way, begin))
+            names += [f"way {number}"] * _EACH
+        return np.concatenate(lanes), names
+
+    def ways(self, classes: int, seed: int, variant: int) -> list[Places]:
+        """Ways around the obstacles, the shortest first."""
+        goal = self.goal_state(variant)
+        if goal is None or classes < 1:
+            return []
+        start = np.real(self.task.system.start)
+        if self.discs is not None:
+            found = shortest_classes(self.discs, start[:2, 2], goal[:2, 2], classes)
+            return [Places(path, np.tile(np.eye(3), (len(path), 1, 1))) for _, path in found]
+        return ways(Space.between(self.keep_out, start, goal), classes, seed)
+
+    def course(self, pieces: int, variant: int, margins: Array | None = None) -> Course:
+        """The programme of that many linear pieces among the obstacles."""
+        task = self.task
+        speed = 4.0 / task.duration  # steps follow the flight that corrects; the search needs no more
+        programme = linear_pieces(task, pieces, speed)
+        first = sum(len(side) > 0 for side in (task.end.before,)) * task.free_slots[0]
+        own = len(programme.slot) - task.free_slots[0] - task.free_slots[1]
+        nodes = np.arange(1, own, 2)  # two exponentials make a step
+        given = np.zeros(len(self.obstacles)) if margins is None else margins
+        goal = task.goal(np.array([variant]))
+        return Course(programme, goal, self.keep_out, task.system.start, first, nodes, given)
+
+    def following(self, course: Course, way: Places, u: Array) -> Array:
+        """Controls (L, C) that end at the goal, as near to the way as they can."""
+        space = Space.between(self.keep_out, np.real(course.start), np.real(course.start))
+        states = space.states(way)
+        at = np.linspace(0, len(states) - 1, len(course.nodes) + 1)[1:].round().astype(int)
+        axes = self.keep_out.axes
+        along = np.einsum("kij,aj->kai", states[at], axes)
+        size = np.max(np.abs(along - np.einsum("ij,aj->ai", np.real(course.start), axes)), axis=(0, 2))
+        weight = _FOLLOW / np.maximum(size, 1e-9) / np.sqrt(len(at))
+
+        def look(_: Rows, u: Array) -> Lanes:
+            at = course.known(u)
+            X, eta = course.states(u)
+            o = np.einsum("lkij,aj->lkai", np.real(X[:, 1 + course.nodes]), axes)
+            off = (o - along) * weight[:, None]
+            lanes, count, m = eta.shape[:3]
+            before = (np.arange(count) <= course.nodes[:, None]).astype(float)
+            moved = np.einsum("ljmxy,lkay->lkajmx", np.real(eta), o * weight[:, None], optimize=True)
+            moved *= before[None, :, None, :, None, None]
+            rows = np.moveaxis(moved, 5, 3).reshape(lanes, -1, count, m)
+            J2 = course.by_slots(rows)
+            flat = off.reshape(lanes, -1)
+            total = np.sqrt(np.sum(at.r**2, axis=1) + np.sum(flat**2, axis=1))
+            total = np.where(np.isfinite(total), total, np.inf)
+            return Lanes(
+                u,
+                total,
+                np.nan_to_num(np.concatenate([at.r, flat], axis=1)),
+                np.nan_to_num(np.concatenate([at.J, J2], axis=1)),
+            )
+
+        return reach(look, course.box, u, replace(self.settings, reach_iterations=_FOLLOWING)).u
+
+    def solved(self, lanes: Array, names: list[str], variant: int) -> tuple[list[Result], int]:
+        """Results of lanes that arrive, the cheapest of each origin refined; how many arrived."""
+        coarse = self.course(_COARSE, variant)
+        u, off = arrive(coarse, lanes, self.settings)
+        there = np.flatnonzero(off <= 100 * ENOUGH)
+        if not len(there):
+            lane = int(np.argmin(off))
+            return [self.refined(u[lane], variant, names[lane])], 0
+        cost = coarse.box.objective(False, u)
+        order = there[np.argsort(cost[there], kind="stable")]
+        # the cheapest of each way, and the cheapest of those that went by none
+        origins: dict[str, list[int]] = {}
+        for lane in order:
+            origins.setdefault(names[lane] if names[lane].startswith("way") else "straight", []).append(int(lane))
+        chosen = [lane for name, lanes_ in origins.items() for lane in lanes_[: _OTHERS if name == "straight" else 1]]
+        quick = replace(self.settings, descend_iterations=min(20, self.settings.descend_iterations), relative=1e-3)
+        lower: list[tuple[float, Array, str]] = []
+        for lane in chosen:
+            v, least, _ = cheaper(coarse, u[lane], quick)
+            lower.append((least, v, names[lane]))
+        lower.sort(key=lambda each: each[0])
+        picked: list[tuple[float, Array, str]] = []
+        for each in lower:
+            alike = [one for one in picked if abs(one[0] - each[0]) <= _ALIKE * each[0]]
+            if not alike and len(picked) < _REFINED:
+                picked.append(each)
+        return [self.refined(v, variant, name) for _, v, name in picked], len(there)
+
+    def refined(self, u: Array, variant: int, name: str) -> Result:
+        """On the fine pieces, with margins where the true system cuts an obstacle between the nodes."""
+        task = self.task
+        coarse = u.reshape(-1, task.controls)
+        before, after = task.free_slots
+        own = _stretched(task.own(coarse), _FINE + 1)
+        v = np.concatenate([coarse[:before], own, coarse[len(coarse) - after :]]).ravel()
+        margins = np.zeros(len(self.obstacles))
+        solver = machine(task.system.group, task.controls)
+        best: Result | None = None
+        for number in range(_AGAIN):
+            course = self.course(_FINE, variant, margins)
+            v, _ = (each[0] for each in arrive(course, v[None], self.settings))
+            limit = self.settings if number == 0 else replace(self.settings, descend_iterations=15)
+            v, _, _ = cheaper(course, v, limit)
+            shape = v.reshape(-1, task.controls)
+            shape, flown = corrected(task, solver, course.programme, shape, variant, True, self.settings)
+            v = shape.ravel()
+            X = self.flight(flown)
+            gaps = np.min(self.keep_out.gaps(X), axis=0)
+            clearance = -1.0 if tunnels(self.obstacles, X) else float(np.min(gaps))
+            way = seen(self.keep_out, X[np.linspace(0, len(X) - 1, 129).round().astype(int)])
+            cost = flown.inputs.integral_of_squares(task.weights)
+            now = Result(flown, variant, cost, clearance, flown.miss, way, name)
+            if best is None or min(now.clearance, 0.0) > min(best.clearance, 0.0):
+                best = now
+            if clearance >= -CLEAR or tunnels(self.obstacles, X):
+                break
+            margins = margins + np.where(gaps < 0, -_WIDER * gaps + CLEAR, 0.0)
+        if best is None:
+            raise ValueError("no round was made")
+        return best
+
+    def flight(self, flown: Flown) -> Array:
+        """States of the true system, so many that it moves by little between two."""
+        step = _LOOK * float(np.min(self.keep_out.sizes))
+        drive, parts = Drive(self.task.system, flown.inputs), 4
+        while True:
+            X = np.real(fly(drive, parts)[1])
+            moved = np.max(np.abs(np.diff(X @ self.keep_out.axes.T, axis=0)), initial=0.0)
+            if moved <= step or parts >= _MOST_PARTS:
+                return X
+            parts *= 2
+
+    def clearances(self, flown: Flown) -> tuple[float, ...]:
+        """Least of each obstacle's own clearance along the way."""
+        X = self.flight(flown)
+        return tuple(float(np.min(each.clearance(X))) for each in self.obstacles)
+
+    def named(self, good: Sequence[Result]) -> tuple[dict[str, Any], ...]:
+        """{"word", "cost", "clearance"} of the cheapest result of each class of ways, the cheapest first."""
+        best: dict[str, dict[str, Any]] = {}
+        kept: list[Places] = []
+        space = Space.between(self.keep_out, np.real(self.task.system.start), np.real(self.task.system.start))
+        for each in good:
+            if self.discs is not None:
+                word = word_text(self.discs.word(resampled(each.way.p, 257)))
+            else:
+                same = [number for number, way in enumerate(kept) if drawn_into(space, each.way, way)]
+                if not same:
+                    kept.append(each.way)
+                word = f"way {same[0] + 1 if same else len(kept)}"
+            best.setdefault(word, {"word": word, "cost": each.cost, "clearance": each.clearance})
+        return tuple(best.values())
+
+
+def _stretched(values: Array, nodes: int) -> Array:
+    """(k, m) values at equal times as (nodes, m)."""
+    s, there = np.linspace(0, 1, nodes), np.linspace(0, 1, len(values))
+    return np.column_stack([np.interp(s, there, column) for column in values.T])
