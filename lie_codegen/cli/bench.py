@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 def bench(
     what: Annotated[
-        str, typer.Argument(help='"" for everything that is timed, "steering", "control", "engines", "propagate".')
+        str,
+        typer.Argument(
+            help='"" for everything that is timed, "steering", "control", "engines", "propagate", "published".'
+        ),
     ] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
     only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
@@ -41,9 +44,12 @@ def bench(
     if what == "propagate":
         _propagate(json)
         return
+    if what == "published":
+        _published(only, json)
+        return
     if what:
         raise InputError(
-            f'bench: nothing is called {what!r}; there are "steering", "control", "engines", "propagate", or nothing for the rest'
+            f'bench: nothing is called {what!r}; there are "steering", "control", "engines", "propagate", "published", or nothing for the rest'
         )
     from lie_codegen.benchmarks.run import bench as measure
 
@@ -84,6 +90,14 @@ def _propagate(json: bool) -> None:
 
     with progress("bench propagate") as report:
         rows, missed = bench_propagate(report)
+    _told(table(rows, missed), rows, missed, json)
+
+
+def _published(only: str, json: bool) -> None:
+    from lie_codegen.benchmarks.published import bench_published, table
+
+    with progress("bench published") as report:
+        rows, missed = bench_published(only, report)
     _told(table(rows, missed), rows, missed, json)
 
 
