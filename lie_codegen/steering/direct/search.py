@@ -143,7 +143,8 @@ def _nearest_variant(task: Manoeuvre, programme: Programme, u: Array) -> Array:
     """(lanes,) the variant of the goal that each lane ends nearest to: on SU(d) a gate that is met up to a phase is met at one of them."""
     end = task.goal(np.arange(len(task.end.values)))
     ends = end.left @ chain_end(programme, u) @ end.right
-    return np.argmin(np.linalg.norm((ends[:, None] - end.value).reshape(len(u), len(end.value), -1), axis=2), axis=1)
+    away = np.linalg.norm((ends[:, None] - end.value).reshape(len(u), len(end.value), -1), axis=2)
+    return np.asarray(np.argmin(away, axis=1))
 
 
 def _descended(
