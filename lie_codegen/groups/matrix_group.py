@@ -166,6 +166,17 @@ class MatrixGroup:
     def __reduce__(self) -> tuple[Any, ...]:
         return MatrixGroup.recorded, (self.record,)
 
+    def save(self, path: Any) -> Any:
+        """Write its definition to a path as a file from which `lc.load` makes an equal group, proved anew; returns the path. The
+        description, which is of no account in comparisons, is not in it.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from lie_codegen.kernel.saved import save_definition
+
+        return save_definition(self, path, f"the group {self.name}")
+
     @cached_property
     def record(self) -> dict[str, Any]:
         """Plain data from which `recorded` makes the group again, without deriving or proving anything."""

@@ -28,6 +28,28 @@ def law(k_p: Any = 4) -> lc.Kernel:
     return lc.attitude_law("pd", inertia=(1, 2, 2), k_p=k_p, k_d=3, name="held")
 
 
+def mine(tmp_path: Path) -> Path:
+    file = tmp_path / "mine.toml"
+    file.write_text(HEISENBERG)
+    return file
+
+
+def test_a_group_is_kept_in_a_file(tmp_path: Path) -> None:
+    """Of the catalogue, reordered, of a file and of matrices with roots: equal, and the same code."""
+    rows = [[["0", "sqrt(2)"], ["-sqrt(2)", "0"]]]
+    for group in (
+        lc.group("su3"),
+        lc.group("se2").reorder(lc.group("se2").labels[::-1]),
+        lc.group(mine(tmp_path)),
+        lc.from_matrices("turn", ["w"], rows),
+    ):
+        again = lc.load(group.save(tmp_path / "group.npz"))
+        assert again == group
+        assert (again.labels, again.units, again.definition_text) == (group.labels, group.units, group.definition_text)
+    x = np.array([0.3])
+    np.testing.assert_array_equal(lc.build(again).exp(x), lc.build(group).exp(x))
+
+
 def spring(ops: Any, x: Any) -> tuple[Any, ...]:
     return (2 * x[0],)
 
@@ -76,8 +98,7 @@ def test_a_loaded_law_computes_the_same_bits_in_another_process(tmp_path: Path) 
 
 
 def test_a_library_of_a_group_file_does_not_need_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(HEISENBERG)
+    path = mine(tmp_path)
     lib = lc.build(path)
     x = [0.3, -1.0, 2.0]
     expected = lib.exp(x)
