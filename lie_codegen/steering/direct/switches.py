@@ -34,8 +34,8 @@ _THERE = 1e-10
 _BRIEF = 2e-3
 #: Of an arc that is put in between others, at first.
 _NEW = 0.01
-#: By how much arcs may miss the goal for one more to be tried, in units of its size.
-_MISSED = 0.1
+#: By how much arcs may miss the goal for one more to be tried, in units of its size: where one more was what lacked, they missed it by 3e-4.
+_MISSED = 0.02
 
 #: Durations (K,), controls (K, m), and which of these move (all where None).
 _Try = tuple[Array, Array, Array | None]
