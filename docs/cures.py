@@ -29,6 +29,7 @@ CURES = {
     "CompilerStoppedError": "memory or time ran out: try again, `$LIE_CODEGEN_COMPILE_SECONDS` for more time",
     "MissingDependencyError": "`pip install 'lie_codegen[EXTRA]'` with the extra that is named",
     "SystemRefusalError": "free disk, memory or processes; `__cause__` is the system's own error",
+    "SubinterpreterError": "run it in processes (`lc.studies` has a pool of them) or in threads: compiled calls release the lock",
     "CacheError": "`LIE_CODEGEN_CACHE=/a/folder/that/can/be/written`",
     "NoCompilerWarning": "install a compiler or `lie_codegen[zig]`; results are the same without, more slowly",
     "CompilerWarning": "mend `$CC` or `$LIE_CODEGEN_CC`, or unset it",

@@ -8,8 +8,10 @@ what it was given, with the first error as its cause. What a function of the use
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import functools
+import importlib
 import sys
 import threading
 import types
@@ -19,7 +21,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import lazy_loader
 
-from lie_codegen.errors import ArgumentError, LieCodegenError, SystemRefusalError
+from lie_codegen.errors import ArgumentError, LieCodegenError, SubinterpreterError, SystemRefusalError
 
 #: Packages whose frames belong to the work of a call: whatever else raises is the user's own.
 _INSIDE = {
@@ -46,11 +48,26 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
     find, listed, names = lazy_loader.attach_stub(package, file)
 
     def found(name: str) -> Any:
+        if is_subinterpreter():
+            raise SubinterpreterError(
+                f"{package}.{name}: NumPy and the compiled code serve the main interpreter of a process alone; "
+                "use processes (lc.studies has a pool of them), or threads: compiled calls release the lock"
+            )
         value = _guarded(find(name), name)
         sys.modules[package].__dict__[name] = value
         return value
 
     return found, listed, names
+
+
+@functools.cache
+def is_subinterpreter() -> bool:
+    """Whether this is another interpreter than the first of its process."""
+    for name in ("_interpreters", "_xxsubinterpreters"):  # of Python 3.13 and newer, and before
+        with contextlib.suppress(ImportError):
+            module = importlib.import_module(name)
+            return bool(module.get_current() != module.get_main())
+    return False
 
 
 def _guarded(value: Any, name: str) -> Any:

@@ -148,6 +148,10 @@ class SystemRefusalError(ComputationError):
     """The system refuses a file, a process or memory; names the function, with the system's error as its cause."""
 
 
+class SubinterpreterError(ComputationError):
+    """Another interpreter than the first of the process asks: NumPy serves the first alone; use processes or threads."""
+
+
 #: What no other name of a file mends: a full disk, a quota, a device that fails, no memory, no more files.
 _OF_THE_SYSTEM = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE}
 
