@@ -37,10 +37,15 @@ _INSIDE = {
     "dask",
     "distributed",
     "zarr",
+    "pyarrow",
+    "xarray",
+    "matplotlib",
+    "PIL",
 }
 _LONGEST = 300
 
 Result = TypeVar("Result")
+Class = TypeVar("Class", bound=type)
 
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -81,11 +86,29 @@ def _guarded(value: Any, name: str) -> Any:
     if isinstance(value, type) and not issubclass(value, enum.Enum) and "__init__" in vars(value):
         constructor = vars(value)["__init__"]
         if isinstance(constructor, types.FunctionType) and not hasattr(constructor, "__guarded__"):
-            type.__setattr__(value, "__init__", _guard(constructor, name))
+            type.__setattr__(value, "__init__", _guard(constructor, name, bound=True))
     return value
 
 
-def _guard(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+def guard_methods(kind: Class) -> Class:
+    """The same class, its public methods behind the guard for whoever calls them from outside: results are asked after the door, too.
+
+    Between our own functions errors pass as they are, for these catch what they expect.
+    """
+    for name, value in list(vars(kind).items()):
+        if name.startswith("_") and name != "__call__":
+            continue
+        wrapped = value.__func__ if isinstance(value, classmethod | staticmethod) else value
+        if isinstance(wrapped, types.FunctionType) and not hasattr(wrapped, "__guarded__"):
+            shown = kind.__name__ if name == "__call__" else f"{kind.__name__}.{name}"
+            guarded = _guard(wrapped, shown, from_outside=True, bound=not isinstance(value, staticmethod))
+            type.__setattr__(kind, name, guarded if wrapped is value else type(value)(guarded))
+    return kind
+
+
+def _guard(
+    function: Callable[..., Any], name: str, *, from_outside: bool = False, bound: bool = False
+) -> Callable[..., Any]:
     @functools.wraps(function)
     def guarded(*args: Any, **named: Any) -> Any:
         try:
@@ -96,9 +119,10 @@ def _guard(function: Callable[..., Any], name: str) -> Callable[..., Any]:
             # No frame below this one: the arguments could not even be bound, which Python says best.
             if error.__traceback__ is None or error.__traceback__.tb_next is None or not _is_inside(error):
                 raise
+            if from_outside and _root(sys._getframe(1)) == "lie_codegen":
+                raise
             kind = SystemRefusalError if isinstance(error, OSError | MemoryError) else ArgumentError
-            # The constructor of a class is given the object too.
-            shown = args[1:] if function.__name__ == "__init__" else args
+            shown = args[1:] if bound else args
             raise kind(f"{name}: {_given(shown, named)}: {type(error).__name__}: {_text(error)}") from error
 
     guarded.__guarded__ = True  # type: ignore[attr-defined]
@@ -167,8 +191,13 @@ def _is_inside(error: Exception) -> bool:
 
 def _belongs_inside(frame: types.FrameType) -> bool:
     """Whether a frame is ours, of Python's own library or of what we compute with; code made by lambdify has no module."""
-    root = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+    root = _root(frame)
     return not root or root in _INSIDE or root in sys.stdlib_module_names
+
+
+def _root(frame: types.FrameType) -> str:
+    """The package of a frame's module."""
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0]
 
 
 def _given(args: tuple[Any, ...], named: dict[str, Any]) -> str:

@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lie_codegen.door import guard_methods
+
 #: Lines and characters of a printed value.
 _LINES, _WIDTH = 10, 110
 _FEW = 4
@@ -24,6 +26,10 @@ class Value:
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        guard_methods(cls)
 
     def __getstate__(self) -> dict[str, Any]:
         kept = (*(each.name for each in fields(self)), "definition")  # of a factory's record, beside its fields

@@ -31,6 +31,7 @@ from lie_codegen.control.observed_vectors import (
     rank_of_outputs,
     vector_weights,
 )
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -50,6 +51,7 @@ from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import scipy
 
 
+@guard_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class Observer(Kernel):
     """The step (X_hat, bias, u, y, h) -> (X_hat_next, bias_next), with what is known of it near rest at X = 1.

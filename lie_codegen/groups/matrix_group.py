@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.algebra.constructions import permutation, reorder_algebra
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, NotFiniteError, NotInAlgebraError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.kernel.casadi_functions import CasadiFunctions
@@ -27,6 +28,7 @@ from lie_codegen.on_demand import sympy as sp
 KERNELS, STEP = "lie_codegen.groups.kernels", "lie_codegen.groups.maps.rkmk"
 
 
+@guard_methods
 @dataclass(frozen=True, eq=False)
 class MatrixGroup:
     """Connected matrix Lie group whose algebra has basis A_1..A_n. Groups are equal whose definitions are.

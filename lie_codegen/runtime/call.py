@@ -14,7 +14,9 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, is_step, python_field
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.plain_data import Definition, makes_records
 from lie_codegen.runtime.arguments import bind, checked, describe, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import loops
@@ -35,6 +37,7 @@ VARYING = "lie_codegen.runtime.varying_build"
 Result = TypeVar("Result")
 
 
+@guard_methods
 class Compiled(Generic[Result]):
     """A callable kernel.
 
@@ -115,10 +118,10 @@ class Compiled(Generic[Result]):
             ShapeError: as for a call; or no input has the leading axis, or two lengths differ.
             InputError: another layout.
         """
-        if layout == "varying":
+        if isinstance(layout, str) and layout == "varying":
             return self._varying.function.batch(*args, out=out, threads=threads, **named)
-        if layout != "whole":
-            raise InputError(f'{self.name}.batch: layout is "whole" or "varying", given {layout!r}')
+        if not isinstance(layout, str) or layout != "whole":
+            raise InputError(f'{self.name}.batch: layout is "whole" or "varying", given {shown(layout)}')
         values = bind(self.signature, args, named)
         arrays, strides, count = sequences(self.signature, values, "samples", self.inputs)
         if count is None:

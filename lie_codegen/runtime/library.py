@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
 from lie_codegen.codegen.signature import Signature
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import CodegenError, InputError
 from lie_codegen.kernel.plain_data import Definition, NoDefinitionError
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from lie_codegen.runtime.call import Compiled
 
 
+@guard_methods
 class Library:
     """Compiled kernels, each an attribute and an item.
 

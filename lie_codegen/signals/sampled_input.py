@@ -72,4 +72,5 @@ class SampledInput(Saved):
         moments = np.asarray(t, dtype=float)
         flat = moments.ravel()
         found = self.formula.values(flat, np.zeros_like(flat), np.zeros(1))[..., 0, :]
+        found = np.where(np.isnan(flat)[:, None], np.nan, found)  # held values depend on no time: at none there is none
         return np.asarray(found.reshape(*found.shape[:-2], *moments.shape, found.shape[-1]))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.studies.driver import Job
 from lie_codegen.studies.store import DONE, FAILED, Store
@@ -20,6 +21,7 @@ from lie_codegen.studies.work import Work
 _READ = 200_000
 
 
+@guard_methods
 @dataclass(frozen=True)
 class Replay:
     """One sample, run again.
@@ -35,6 +37,7 @@ class Replay:
     result: Any
 
 
+@guard_methods
 class Study:
     """A study and its store; made by `lc.study`, opened again by `lc.studies.open_study`."""
 

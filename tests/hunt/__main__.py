@@ -21,6 +21,7 @@ from tests.hunt import (
     generated_c,
     growth,
     hostile,
+    methods,
     off_manifold,
     solver_arguments,
     texts,
@@ -35,6 +36,7 @@ Part = Callable[[], tuple[int, list[str]]]
 def parts(scale: int, home: Path) -> dict[str, Part]:
     """What is hunted: (what, unit) -> the hunt."""
     found: dict[str, Part] = {"calls of the front door with one hostile argument": lambda: _calls(scale)}
+    found["calls of methods of results with one hostile argument"] = lambda: methods.hunt(min(1.0, 0.1 * scale))
     for kind in texts.KINDS:
         found[f"{kind} by Hypothesis, after the corpus"] = lambda kind=kind: texts.hunt(kind, 100 * scale)
     found["targets and states off the group"] = lambda: off_manifold.hunt(8 * scale)

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 import lie_codegen as lc
 from lie_codegen.errors import LieCodegenError
-from tests.hunt import hostile, plausible
+from tests.hunt import hostile, methods, plausible
 
 HUGE = 2**63
+PATHS = (3, 1.5, ["a"], "/no/such/place/at all", "/")
 CALLS: dict[str, Callable[[], Any]] = {
     "levels of brackets": lambda: lc.accessibility_rank("so3", ["1", "2", "3"], [[1, 0, 0]], depth=HUGE),
     "degree of products": lambda: lc.second_order_controllability("so3", ["1", "2", "3"], [[1, 0, 0]], degree=10**5000),
@@ -31,6 +33,61 @@ CALLS: dict[str, Callable[[], Any]] = {
 def test_it_is_refused_soon(name: str) -> None:
     with pytest.raises(LieCodegenError):
         hostile.alarmed(4.0, CALLS[name])
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("method", ["save", "to_csv", "to_json"])
+def test_a_plan_is_not_written_to_no_path(method: str, path: Any) -> None:
+    with pytest.raises(LieCodegenError):
+        getattr(plausible._plan(), method)(path)
+
+
+def test_methods_of_results_refuse_what_is_no_number() -> None:
+    body = plausible.PLAUSIBLE["body"]()
+    for call in (
+        lambda: plausible._plan().u("no time"),
+        lambda: plausible._plan().X({}),
+        lambda: plausible._loop().at({}),
+        lambda: lc.group("so3").hat({}),
+        lambda: lc.Uniform(0, 1).draw({}),
+        lambda: body.motion(10**5000),
+        lambda: lc.build("so3").exp.batch(np.ones((2, 3)), layout=np.ones(3)),
+    ):
+        with pytest.raises(LieCodegenError):
+            call()
+
+
+def test_what_a_function_of_the_user_raises_passes() -> None:
+    """The guard is for what goes wrong inside; the user's own error is the user's."""
+
+    class OwnError(Exception):
+        pass
+
+    def broken(t: Any) -> Any:
+        raise OwnError
+
+    plan = plausible._plan()
+    with pytest.raises(OwnError):
+        lc.simulate("so3", broken, t=[0.0, 1.0])
+    with pytest.raises(TypeError, match="missing"):
+        plan.X()
+
+
+def test_samples_at_no_time_are_no_numbers() -> None:
+    held = lc.SampledInput([0.0, 0.5, 1.0], np.ones((2, 3)))
+    assert np.isnan(held(np.nan)).all()
+    assert np.isnan(held([0.2, np.nan])).all(axis=1).tolist() == [False, True]
+
+
+def test_counts_without_end_are_refused() -> None:
+    controller = methods._controller()
+    for count in (HUGE, 10**5000, True, 2.0):
+        with pytest.raises(LieCodegenError):
+            hostile.alarmed(4.0, lambda count=count: controller.problem.solve(Xd=np.eye(3), starts=count))
+        for name in ("steps", "runs", "substeps", "delay"):
+            given = {"steps": 1, "values": {"Xd": np.eye(3)}, name: count}
+            with pytest.raises(LieCodegenError):
+                hostile.alarmed(4.0, lambda given=given: controller.simulate(**given))
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from tests.hunt import (
     generated_c,
     growth,
     hostile,
+    methods,
     off_manifold,
     solver_arguments,
     texts,
@@ -26,6 +27,12 @@ SECURITY = Path(__file__).resolve().parents[2] / "SECURITY.md"
 def test_only_errors_of_ours_leave_the_front_door() -> None:
     tried, found = hostile.hunt(0.01, seed=1)
     assert tried > 100
+    assert not found, "\n".join(found)
+
+
+def test_only_errors_of_ours_leave_the_methods_of_results() -> None:
+    tried, found = methods.hunt(0.02, seed=1)
+    assert tried > 150
     assert not found, "\n".join(found)
 
 

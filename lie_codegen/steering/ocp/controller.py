@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.counts import count_between
 from lie_codegen.steering.ocp.elements import pack_element
 from lie_codegen.steering.ocp.loop import LoopRun, run_loop
 from lie_codegen.steering.ocp.machine import CompiledMachine, loop_machine
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 _STATUS = {OK: "ok", HELD: "held", INPUT: "input"}
 
 
+@guard_methods
 class ModelPredictiveControl:
     """The controller. One object is one loop: give each thread its own.
 
@@ -199,7 +202,10 @@ class ModelPredictiveControl:
                 noise=noise, delay=delay, compensate=compensate, substeps=substeps, seed=number,
             )  # fmt: skip
 
-        return run(seed) if runs is None else tuple(run(seed + i) for i in range(runs))
+        if runs is None:
+            return run(seed)
+        many = count_between(runs, 1, 1_000_000, f"closed loop of {self.problem.data.name}: runs")
+        return tuple(run(seed + i) for i in range(many))
 
     def render_package(self, real: str = "double") -> dict[str, str]:
         """The C package that `lc.generate(mpc, folder)` writes: {path: text}; its example starts from the plan of `reset`.

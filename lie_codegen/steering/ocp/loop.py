@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.counts import count_between
 from lie_codegen.flow.elements import group_element
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.machine import loop_machine
@@ -22,6 +23,7 @@ from lie_codegen.steering.ocp.problem import OptimalControlProblem
 Plant = Callable[..., tuple[ArrayLike, Mapping[str, ArrayLike]]]
 
 
+@guard_methods
 @dataclass(frozen=True, eq=False)
 class LoopRun:
     """A closed loop that was run.
@@ -99,9 +101,9 @@ def run_loop(
     """
     data = controller.problem.data
     where = f"closed loop of {data.name}"
-    for what, number, least in (("steps", steps, 1), ("delay", delay, 0), ("substeps", substeps, 1)):
-        if operator.index(number) < least:
-            raise InputError(f"{where}: {what} must be a whole number of at least {least}, got {number!r}")
+    count_between(steps, 1, 100_000_000, f"{where}: steps")
+    count_between(delay, 0, 100_000, f"{where}: delay")
+    count_between(substeps, 1, 1_000_000, f"{where}: substeps")
     rng = np.random.default_rng(seed)
     machine, h, free = loop_machine(data), controller.sample, data.free_duration is not None
     told = {name: value for name, value in values.items() if name in data.parameters.names}
@@ -115,10 +117,10 @@ def run_loop(
     x = np.concatenate([pack_element(data, X), data.states.rows(first, 1, where)[0]])
     move = _plant(data, plant, plant_values, told, controller, substeps, rng, where)
     disturb = _noise(data, noise, rng, where)
-    pending = [np.array(row) for row in controller.plan.u[: operator.index(delay)]]
+    pending = [np.array(row) for row in controller.plan.u[:delay]]
     believed = _row(data, controller, {})
     record: dict[str, list[Any]] = {name: [] for name in ("x", "u", "status", "violation", "seconds", "cost")}
-    for k in range(operator.index(steps)):
+    for k in range(steps):
         now = {name: value(k) if callable(value) else value for name, value in told.items()}
         believed = _row(data, controller, now)
         measured = disturb(x)

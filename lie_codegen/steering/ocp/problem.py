@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError
+from lie_codegen.exact.counts import count_between
 from lie_codegen.flow.elements import group_element
 from lie_codegen.runtime.patience import shows_progress
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
@@ -29,6 +30,7 @@ from lie_codegen.steering.plan import Status
 _STATUS = (Status.SOLVED, Status.ADMISSIBLE, Status.NOT_ADMISSIBLE, Status.DIVERGED)
 
 
+@guard_methods
 @dataclass(frozen=True)
 class OptimalControlProblem:
     """A problem that `lc.ocp` checked. Its solver is compiled when first used, once for all states and parameters.
@@ -91,9 +93,9 @@ class OptimalControlProblem:
             InputError, ShapeError, NotFiniteError, NotOnGroupError: naming the culprit.
         """
         where = f"{self.data.name}.solve"
-        count = _at_least_one(starts, "starts", where)
-        _at_least_one(iterations, "iterations", where)
-        _at_least_one(1 if threads is None else threads, "threads", where)
+        count = count_between(starts, 1, 1_000_000, f"{where}: starts")
+        count_between(iterations, 1, 1_000_000_000, f"{where}: iterations")
+        count_between(1 if threads is None else threads, 1, 4096, f"{where}: threads")
         for what, value in (("tolerance", tolerance), ("allowed", allowed)):
             if not (isinstance(value, int | float | np.number) and 0 <= value < np.inf):
                 raise InputError(f"{where}: {what} must be a number of at least 0, got {value!r}")
@@ -184,13 +186,3 @@ class OptimalControlProblem:
         if row < 0 or not violation > 0:
             return None
         return machine.row_names[row], stage
-
-
-def _at_least_one(value: Any, what: str, where: str) -> int:
-    try:
-        count = operator.index(value)
-    except TypeError:
-        count = 0
-    if count < 1:
-        raise InputError(f"{where}: {what} must be a whole number of at least 1, got {value!r}")
-    return count
