@@ -50,7 +50,7 @@ def test_methods_of_results_refuse_what_is_no_number() -> None:
         lambda: plausible._loop().at({}),
         lambda: lc.group("so3").hat({}),
         lambda: lc.Uniform(0, 1).draw({}),
-        lambda: body.motion(10**5000),
+        lambda: body.motion(10**5000, 1.0),
         lambda: lc.build("so3").exp.batch(np.ones((2, 3)), layout=np.ones(3)),
     ):
         with pytest.raises(LieCodegenError):
