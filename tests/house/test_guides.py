@@ -26,9 +26,9 @@ def test_every_public_name_has_a_line_in_the_guide(subject: str) -> None:
     assert not missing, f"lie_codegen/{subject}/README.md says nothing of {', '.join(missing)}"
 
 
-@pytest.mark.parametrize("subject", [each for each in SUBJECTS if each != "steering"])
+@pytest.mark.parametrize("subject", [each for each in SUBJECTS if each not in ("control", "steering")])
 def test_the_code_of_a_guide_runs(subject: str, repository: Path, tmp_path: Path) -> None:
-    """Blocks of one guide run one after the other; tests/steering runs that of steering."""
+    """Blocks of one guide run one after the other; tests/control and tests/steering run those of theirs."""
     text = (front_door.PACKAGE / subject / "README.md").read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"^```python\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE))
     environment = {**os.environ, "PYTHONPATH": str(repository)}

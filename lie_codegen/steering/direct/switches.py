@@ -23,6 +23,8 @@ from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.direct.programme import Programme
 
 _ITERATIONS = 80
+#: Steps that promise to leave more than that part of the residual lead to the nearest end there is, not to the goal.
+_STALLED = 0.99
 #: Neighbours whose controls differ by less, relative to the bounds, are one arc.
 _BLUR = 0.02
 #: The same, for arcs whose controls are then held at a bound or zero; and how near to it they are for that.
@@ -180,8 +182,13 @@ def _solved(task: Manoeuvre, s: Array, u: Array, moving: Array | None, variant: 
         open_ = ~(((x <= low) & (pull > 0)) | ((x >= high) & (pull < 0)))
         scaled = J * np.where(open_, unit, 0.0)
         K = scaled @ J.T
-        K += (damped * np.trace(K) / len(K) + 1e-300) * np.eye(len(K))
-        trial = np.clip(x - scaled.T @ np.linalg.solve(K, r), low, high)
+        shift = damped * np.trace(K) / len(K) + 1e-300
+        K += shift * np.eye(len(K))
+        y = np.linalg.solve(K, r)
+        # shift y is what the step would leave of r, were the equations linear: where that is r, no arrival is near
+        if damped <= 1 and float(np.linalg.norm(shift * y)) > _STALLED * size:
+            break
+        trial = np.clip(x - scaled.T @ y, low, high)
         new_r, new_J = equations(trial)
         if np.linalg.norm(new_r) < size:
             x, r, J, damped = trial, new_r, new_J, max(damped / 5, 1e-13)
