@@ -24,6 +24,13 @@ enum {
     NEND = OCP_NG_END + OCP_NE  /* conditions at the end */
 };
 
+/* Small products are worth their place in the caller, where their sizes are constants. */
+#if defined(__GNUC__)
+#define OCP_INLINE static inline __attribute__((always_inline))
+#else
+#define OCP_INLINE static
+#endif
+
 #define OCP_LOOSE(round) ((real)(round == 0 ? 1e-3 : round == 1 ? 1e-4 : round == 2 ? 1e-5 : 1e-7))
 #define LARGEST_PENALTY ((real)1e7)
 #define CLEAN_PENALTY ((real)1e5)
@@ -37,14 +44,17 @@ typedef struct {
     int exact;          /* curvature of dynamics and constraints too, not Gauss-Newton alone */
 } task;
 
-/* What a linearised step keeps for its second order. */
+/* Where a step is asked for its state: at its end, by rk_b, and within it, by rk_inner, at the inner node of a quadrature that has one. */
+enum { AT_END = 0, INNER = 1, PLACES = OCP_INNER ? 2 : 1 };
+
+/* A linearised step: its stages, and the totals at the places of it. */
 typedef struct {
     real y[OCP_STAGES][NX];             /* argument of each Runge-Kutta stage, as (theta, change of z) */
     real slope[OCP_STAGES][NX * NV];    /* its derivative by (d, u) */
     real stage[OCP_STAGES][NX * NC];    /* derivative of the stage by its own arguments */
-    real total[NX];
-    real total_slope[NX * NV];
-    real Ad[OCP_DIM * OCP_DIM];         /* of exp(-total) */
+    real total[PLACES][NX];
+    real total_slope[PLACES][NX * NV];
+    real Ad[OCP_DIM * OCP_DIM];         /* of exp(-total), of the place last asked for */
     real right[OCP_DIM * OCP_DIM];      /* right Jacobian at the total */
 } chain;
 
@@ -64,10 +74,10 @@ static int all_finite(const real *a, int count)
     return 1;
 }
 
-static void copy(real *to, const real *from, int count) { memcpy(to, from, (size_t)count * sizeof *to); }
-static void clear(real *to, int count) { memset(to, 0, (size_t)count * sizeof *to); }
+OCP_INLINE void copy(real *to, const real *from, int count) { memcpy(to, from, (size_t)count * sizeof *to); }
+OCP_INLINE void clear(real *to, int count) { memset(to, 0, (size_t)count * sizeof *to); }
 
-static real dot(const real *a, const real *b, int count)
+OCP_INLINE real dot(const real *a, const real *b, int count)
 {
     real total = 0;
     int i;
@@ -77,35 +87,45 @@ static real dot(const real *a, const real *b, int count)
     return total;
 }
 
-/* C (rows x columns) += factor A (rows x inner) B (inner x columns); the zeros of A, where derivatives vanish, cost nothing. */
-static void add_product(real *C, const real *A, const real *B, int rows, int inner, int columns, real factor)
+/*
+ * c (columns) += sum_k a_k B_k, a_k at a + k `apart`, B_k the rows of B. Four rows at a time: c is read and written once for them. Zeros
+ * of a, where derivatives vanish, cost nothing.
+ */
+OCP_INLINE void add_rows(real *c, const real *a, int apart, const real *B, int inner, int columns, real factor)
 {
-    int i, k, j;
-    for (i = 0; i < rows; ++i) {
-        for (k = 0; k < inner; ++k) {
-            const real a = factor * A[i * inner + k];
-            if (a != 0) {
-                for (j = 0; j < columns; ++j) {
-                    C[i * columns + j] += a * B[k * columns + j];
-                }
+    int k, j;
+    for (k = 0; k + 4 <= inner; k += 4) {
+        const real a0 = factor * a[k * apart], a1 = factor * a[(k + 1) * apart], a2 = factor * a[(k + 2) * apart];
+        const real a3 = factor * a[(k + 3) * apart], *b = B + k * columns;
+        if (a0 != 0 || a1 != 0 || a2 != 0 || a3 != 0) {
+            for (j = 0; j < columns; ++j) {
+                c[j] += (a0 * b[j] + a1 * b[columns + j]) + (a2 * b[2 * columns + j] + a3 * b[3 * columns + j]);
             }
+        }
+    }
+    for (; k < inner; ++k) {
+        const real a0 = factor * a[k * apart];
+        for (j = 0; j < columns; ++j) {
+            c[j] += a0 * B[k * columns + j];
         }
     }
 }
 
-/* C (rows x columns) += A' B, A (inner x rows), B (inner x columns). */
-static void add_transposed(real *C, const real *A, const real *B, int inner, int rows, int columns)
+/* C (rows x columns) += factor A (rows x inner) B (inner x columns). */
+OCP_INLINE void add_product(real *C, const real *A, const real *B, int rows, int inner, int columns, real factor)
 {
-    int i, k, j;
-    for (k = 0; k < inner; ++k) {
-        for (i = 0; i < rows; ++i) {
-            const real a = A[k * rows + i];
-            if (a != 0) {
-                for (j = 0; j < columns; ++j) {
-                    C[i * columns + j] += a * B[k * columns + j];
-                }
-            }
-        }
+    int i;
+    for (i = 0; i < rows; ++i) {
+        add_rows(C + i * columns, A + i * inner, 1, B, inner, columns, factor);
+    }
+}
+
+/* C (rows x columns) += A' B, A (inner x rows), B (inner x columns). */
+OCP_INLINE void add_transposed(real *C, const real *A, const real *B, int inner, int rows, int columns)
+{
+    int i;
+    for (i = 0; i < rows; ++i) {
+        add_rows(C + i * columns, A + i, rows, B, inner, columns, 1);
     }
 }
 
@@ -129,35 +149,52 @@ static void add_pulled_back(real *Q, real *q, const real *W, const real *w, cons
     }
 }
 
-/* x_{k+1} = F(x, u): an explicit Runge-Kutta step in canonical coordinates around X, theta' = dexpinv_theta(xi). */
-static void step(const real *x, const real *u, const real *p, real t, real h, real *next)
+/* The share of a stage in what is reached at a place. */
+static real share_of(int place, int s)
 {
-    real y[NX], k[NX], total[NX];
-    int i, s;
+#if OCP_INNER
+    if (place == INNER) {
+        return rk_inner[s];
+    }
+#endif
+    (void)place;
+    return rk_b[s];
+}
+
+/*
+ * x_{k+1} = F(x, u): an explicit Runge-Kutta step in canonical coordinates around X, theta' = dexpinv_theta(xi). `inner`, unless it is
+ * null, gets the state at the inner node, by the method's own interpolant: its stages serve both.
+ */
+static void step(const real *x, const real *u, const real *p, real t, real h, real *next, real *inner)
+{
+    real y[NX], k[NX], total[PLACES][NX];
+    int i, s, place;
     clear(y, NX);
-    clear(total, NX);
+    clear(total[0], PLACES * NX);
     for (s = 0; s < OCP_STAGES; ++s) {
         for (i = 0; s > 0 && i < NX; ++i) {
             y[i] = h * rk_a[s] * k[i];
         }
         model_stage(x, y, u, p, t + rk_c[s] * h, k);
-        for (i = 0; i < NX; ++i) {
-            total[i] += h * rk_b[s] * k[i];
+        for (place = 0; place < PLACES; ++place) {
+            for (i = 0; i < NX; ++i) {
+                total[place][i] += h * share_of(place, s) * k[i];
+            }
         }
     }
-    model_move(x, total, next);
+    model_move(x, total[AT_END], next);
+    if (PLACES > 1 && inner) {
+        model_move(x, total[PLACES - 1], inner);
+    }
 }
 
-/*
- * F and J = dF / d(d, u) (NX x NV). With F_X = X exp(Theta):  F_X^-1 F_X(moved) = Ad(exp(-Theta)) eta + J_r(Theta) dTheta
- * to first order, and dTheta follows the stages by the chain rule.
- */
-static void linear_step(const real *x, const real *u, const real *p, real t, real h, real *next, real *J, chain *c)
+/* The stages of a step with their derivatives by (d, u), by the chain rule, and the totals. */
+static void linear_stages(const real *x, const real *u, const real *p, real t, real h, chain *c)
 {
-    real k[NX], slope[NX * NV], by_d[NX * NV], by_y[NX * NX];
-    int i, j, s;
-    clear(c->total, NX);
-    clear(c->total_slope, NX * NV);
+    real k[NX], slope[NX * NV];
+    int i, s, place;
+    clear(c->total[0], PLACES * NX);
+    clear(c->total_slope[0], PLACES * NX * NV);
     for (s = 0; s < OCP_STAGES; ++s) {
         real *y = c->y[s], *Y = c->slope[s], *S = c->stage[s];
         clear(y, NX);
@@ -172,32 +209,43 @@ static void linear_step(const real *x, const real *u, const real *p, real t, rea
         /* arguments are (eta, theta, z, u): d and u enter directly, y through theta and, with d_z, through z */
         for (i = 0; i < NX; ++i) {
             const real *from = S + i * NC;
-            copy(by_d + i * NV, from, OCP_DIM);
-            copy(by_d + i * NV + OCP_DIM, from + 2 * OCP_DIM, OCP_Q + OCP_M);
-            copy(by_y + i * NX, from + OCP_DIM, NX);
+            copy(slope + i * NV, from, OCP_DIM);
+            copy(slope + i * NV + OCP_DIM, from + 2 * OCP_DIM, OCP_Q + OCP_M);
+            if (s > 0) {
+                add_rows(slope + i * NV, from + OCP_DIM, 1, Y, NX, NV, 1);
+            }
         }
-        copy(slope, by_d, NX * NV);
-        if (s > 0) {
-            add_product(slope, by_y, Y, NX, NX, NV, 1);
-        }
-        for (i = 0; i < NX; ++i) {
-            c->total[i] += h * rk_b[s] * k[i];
-        }
-        for (i = 0; i < NX * NV; ++i) {
-            c->total_slope[i] += h * rk_b[s] * slope[i];
+        for (place = 0; place < PLACES; ++place) {
+            const real weight = h * share_of(place, s);
+            for (i = 0; i < NX; ++i) {
+                c->total[place][i] += weight * k[i];
+            }
+            for (i = 0; i < NX * NV; ++i) {
+                c->total_slope[place][i] += weight * slope[i];
+            }
         }
     }
-    model_move(x, c->total, next);
-    model_move_jacobian(c->total, c->Ad, c->right);
+}
+
+/*
+ * F at a place of the step and J = dF / d(d, u) (NX x NV). With F_X = X exp(Theta):  F_X^-1 F_X(moved) = Ad(exp(-Theta)) eta +
+ * J_r(Theta) dTheta to first order.
+ */
+static void reached(const real *x, chain *c, int place, real *next, real *J)
+{
+    const real *slope = c->total_slope[place];
+    int i, j;
+    model_move(x, c->total[place], next);
+    model_move_jacobian(c->total[place], c->Ad, c->right);
     clear(J, NX * NV);
-    add_product(J, c->right, c->total_slope, OCP_DIM, OCP_DIM, NV, 1);
+    add_product(J, c->right, slope, OCP_DIM, OCP_DIM, NV, 1);
     for (i = 0; i < OCP_DIM; ++i) {
         for (j = 0; j < OCP_DIM; ++j) {
             J[i * NV + j] += c->Ad[i * OCP_DIM + j];
         }
     }
     for (i = OCP_DIM; i < NX; ++i) {
-        copy(J + i * NV, c->total_slope + i * NV, NV);
+        copy(J + i * NV, slope + i * NV, NV);
         J[i * NV + i] += 1;
     }
 }
@@ -222,23 +270,26 @@ static void add_chained(real *Q, const real *H, const real *Y)
     add_transposed(Q, Y, T + OCP_DIM * NV, NX, NV, NV);
 }
 
-/* Adds the Hessian of mu . F by (d, u) to H (NV x NV): from the end of the chain to its beginning. */
-static void add_step_curvature(const real *x, const real *u, const real *p, real t, real h, const chain *c,
-    const real *mu, real *H)
+/*
+ * Of the Hessian of mu . F by (d, u), F at the place last asked for, what the end of the chain adds to H (NV x NV); what mu asks of
+ * each stage is added to `loads`, for add_stage_curvature.
+ */
+static void add_end_curvature(const chain *c, int place, const real *mu, real h, real (*loads)[NX], real *H)
 {
-    real S[OCP_DIM * OCP_DIM], C[OCP_DIM * OCP_DIM], CJ[OCP_DIM * NV], T[OCP_DIM * NV], curve[NC * NC], nu[NX], m[NX], back[NX];
+    real S[OCP_DIM * OCP_DIM], C[OCP_DIM * OCP_DIM], CJ[OCP_DIM * NV], T[OCP_DIM * NV], nu[NX];
+    const real *slope = c->total_slope[place];
     int i, j, s;
     /*
-     * The end of the chain, X exp(eta) exp(Theta + dTheta), to second order in (eta, dTheta): dTheta' S dTheta / 2 from the right
-     * Jacobian, and a' C b / 2 from the bracket [a, b], a = Ad eta, b = J_r dTheta, twice for its two places in the Hessian.
+     * X exp(eta) exp(Theta + dTheta), to second order in (eta, dTheta): dTheta' S dTheta / 2 from the right Jacobian, and
+     * a' C b / 2 from the bracket [a, b], a = Ad eta, b = J_r dTheta, twice for its two places in the Hessian.
      */
-    model_move_hessian(c->total, mu, S, C);
+    model_move_hessian(c->total[place], mu, S, C);
     clear(T, OCP_DIM * NV);
-    add_product(T, S, c->total_slope, OCP_DIM, OCP_DIM, NV, 1);
-    add_transposed(H, c->total_slope, T, OCP_DIM, NV, NV);
+    add_product(T, S, slope, OCP_DIM, OCP_DIM, NV, 1);
+    add_transposed(H, slope, T, OCP_DIM, NV, NV);
     clear(T, OCP_DIM * NV);
     clear(CJ, OCP_DIM * NV);
-    add_product(T, c->right, c->total_slope, OCP_DIM, OCP_DIM, NV, (real)0.5);
+    add_product(T, c->right, slope, OCP_DIM, OCP_DIM, NV, (real)0.5);
     add_product(CJ, C, T, OCP_DIM, OCP_DIM, NV, 1);
     clear(T, OCP_DIM * NV);
     add_transposed(T, c->Ad, CJ, OCP_DIM, OCP_DIM, NV);
@@ -251,17 +302,25 @@ static void add_step_curvature(const real *x, const real *u, const real *p, real
     clear(nu, NX);
     add_transposed(nu, c->right, mu, OCP_DIM, OCP_DIM, 1);
     copy(nu + OCP_DIM, mu + OCP_DIM, OCP_Q);
-    clear(back, NX);
-    for (s = OCP_STAGES - 1; s >= 0; --s) {
+    for (s = 0; s < OCP_STAGES; ++s) {
         for (i = 0; i < NX; ++i) {
-            m[i] = h * rk_b[s] * nu[i] + back[i];
+            loads[s][i] += h * share_of(place, s) * nu[i];
         }
+    }
+}
+
+/* The stages' part of those Hessians, once for all places, from the end of the chain to its beginning. */
+static void add_stage_curvature(const real *x, const real *u, const real *p, real t, real h, const chain *c, real (*loads)[NX], real *H)
+{
+    real curve[NC * NC];
+    int i, j, s;
+    for (s = OCP_STAGES - 1; s >= 0; --s) {
+        const real *m = loads[s];
         model_stage_hessian(x, c->y[s], u, p, t + rk_c[s] * h, m, curve);
         add_chained(H, curve, c->slope[s]);
-        clear(back, NX);
         for (i = 0; s > 0 && i < NX; ++i) {
             for (j = 0; j < NX; ++j) {
-                back[j] += h * rk_a[s] * c->stage[s][i * NC + OCP_DIM + j] * m[i];
+                loads[s - 1][j] += h * rk_a[s] * c->stage[s][i * NC + OCP_DIM + j] * m[i];
             }
         }
     }
@@ -278,7 +337,6 @@ static real pressed(real lambda, real rho, real g) { return largest(0, lambda + 
 static int is_given(int k, int i) { return k == 0 && !needs_control[i]; }
 #endif
 
-/* Cost of the interval k at the nodes of the quadrature; the node in the middle is reached by half a step. */
 static real cost_at(const real *x, const real *u, const real *p, real t)
 {
     real value;
@@ -286,9 +344,10 @@ static real cost_at(const real *x, const real *u, const real *p, real t)
     return value;
 }
 
-static real interval_cost(const task *s, int k, const real *x, const real *u, const real *next)
+/* Cost of the interval k at the nodes of the quadrature; `inner` is the state at the node within it, where there is one. */
+static real interval_cost(const task *s, int k, const real *x, const real *u, const real *next, const real *inner)
 {
-    real total = 0, middle[NS];
+    real total = 0;
     int j;
     for (j = 0; j < OCP_NODES; ++j) {
         if (node_c[j] == 0) {
@@ -296,8 +355,7 @@ static real interval_cost(const task *s, int k, const real *x, const real *u, co
         } else if (node_c[j] == 1) {
             total += node_w[j] * cost_at(next, u, row(s, k + 1), time_of(s, k + 1));
         } else {
-            step(x, u, row(s, k), time_of(s, k), node_c[j] * OCP_H, middle);
-            total += node_w[j] * cost_at(middle, u, row(s, k), time_of(s, k) + node_c[j] * OCP_H);
+            total += node_w[j] * cost_at(inner, u, row(s, k), time_of(s, k) + node_c[j] * OCP_H);
         }
     }
     return total;
@@ -341,12 +399,22 @@ static real end_terms(const task *s, const real *x)
 }
 
 #if OCP_PLANS
+/* The same of a trajectory that is known, the state within the interval being found once more. */
+static real cost_between(const task *s, int k, const real *x, const real *u, const real *next)
+{
+    real again[NS], inner[NS];
+    if (OCP_INNER) {
+        step(x, u, row(s, k), time_of(s, k), OCP_H, again, inner);
+    }
+    return interval_cost(s, k, x, u, next, OCP_INNER ? inner : next);
+}
+
 static real merit(const task *s, real (*x)[NS], real (*u)[OCP_M])
 {
     real total = end_terms(s, x[OCP_N]);
     int k;
     for (k = 0; k < OCP_N; ++k) {
-        total += interval_cost(s, k, x[k], u[k], x[k + 1]) + path_terms(s, k, x[k], u[k]);
+        total += cost_between(s, k, x[k], u[k], x[k + 1]) + path_terms(s, k, x[k], u[k]);
     }
     return total;
 }
@@ -357,7 +425,7 @@ static real plain_cost(const task *s)
     int k;
     model_end_cost(w->x[OCP_N], row(s, OCP_N), time_of(s, OCP_N), &total);
     for (k = 0; k < OCP_N; ++k) {
-        total += interval_cost(s, k, w->x[k], w->u[k], w->x[k + 1]);
+        total += cost_between(s, k, w->x[k], w->u[k], w->x[k + 1]);
     }
     return total;
 }
@@ -613,6 +681,9 @@ static real stage_model(const task *s, int k, const real *P, const real *v, real
     const real *x = w->x[k], *u = w->u[k], *p = row(s, k);
     const real t = time_of(s, k);
     real W[NV * NV], weighted[NV], H[NV * NV], gradient[NV], J[NX * NV], next[NS], value = 0;
+#if OCP_SECOND_ORDER
+    real loads[OCP_STAGES][NX];
+#endif
     chain c;
     int i, j, n;
     clear(Q, NV * NV);
@@ -634,11 +705,13 @@ static real stage_model(const task *s, int k, const real *P, const real *v, real
             }
         }
     }
-    linear_step(x, u, p, t, OCP_H, next, J, &c);
+    linear_stages(x, u, p, t, OCP_H, &c);
+    reached(x, &c, AT_END, next, J);
     add_pulled_back(Q, q, W, weighted, J);
 #if OCP_SECOND_ORDER
+    clear(loads[0], OCP_STAGES * NX);
     if (s->exact) {
-        add_step_curvature(x, u, p, t, OCP_H, &c, weighted, Q);
+        add_end_curvature(&c, AT_END, weighted, OCP_H, loads, Q);
     }
 #endif
     for (n = 0; n < OCP_NODES; ++n) {
@@ -651,7 +724,7 @@ static real stage_model(const task *s, int k, const real *P, const real *v, real
                 q[i] += node_w[n] * gradient[i];
             }
         } else if (node_c[n] < 1) {
-            linear_step(x, u, p, t, node_c[n] * OCP_H, next, J, &c);
+            reached(x, &c, PLACES - 1, next, J);
             value += node_w[n] * cost_terms(s, next, u, p, t + node_c[n] * OCP_H, gradient, H);
             for (i = 0; i < NV * NV; ++i) {
                 H[i] *= node_w[n];
@@ -662,11 +735,16 @@ static real stage_model(const task *s, int k, const real *P, const real *v, real
             add_pulled_back(Q, q, H, gradient, J);
 #if OCP_SECOND_ORDER
             if (s->exact) {
-                add_step_curvature(x, u, p, t, node_c[n] * OCP_H, &c, gradient, Q);
+                add_end_curvature(&c, PLACES - 1, gradient, OCP_H, loads, Q);
             }
 #endif
         }
     }
+#if OCP_SECOND_ORDER
+    if (s->exact) {
+        add_stage_curvature(x, u, p, t, OCP_H, &c, loads, Q);
+    }
+#endif
 #if OCP_NG > 0
     {
         real g[OCP_NG], G[OCP_NG * NV], a[OCP_NG];
@@ -709,7 +787,8 @@ static int backward(const task *s, real shift, real *gain, real *value, real *P,
     *gain = 0;
     *value = end_model(s, P, v);
     for (k = OCP_N - 1; k >= 0; --k) {
-        real shifted[OCP_M * OCP_M], low[OCP_M], high[OCP_M], L[OCP_M * OCP_M], column[OCP_M], Qk[OCP_M], QK[OCP_M * NX];
+        real shifted[OCP_M * OCP_M], low[OCP_M], high[OCP_M], L[OCP_M * OCP_M], column[OCP_M], Qk[OCP_M];
+        real half[OCP_M * NX], sides[NX * NX]; /* Q_ux + Q_uu K / 2, and K' of it */
         real *K = w->K[k], *kappa = w->kappa[k];
         int index[OCP_M], count;
         *value += stage_model(s, k, P, v, Q, q);
@@ -735,19 +814,18 @@ static int backward(const task *s, real shift, real *gain, real *value, real *P,
             }
         }
         /* the cost-to-go under u + kappa + K d, with the true Q_uu: the shift only shortens the step */
-        clear(QK, OCP_M * NX);
+        clear(half, OCP_M * NX);
         for (i = 0; i < OCP_M; ++i) {
-            Qk[i] = 0;
-            for (j = 0; j < OCP_M; ++j) {
-                const real quu = Q[(NX + i) * NV + NX + j];
-                int m;
-                Qk[i] += quu * kappa[j];
-                for (m = 0; m < NX; ++m) {
-                    QK[i * NX + m] += quu * K[j * NX + m];
-                }
+            const real *quu = Q + (NX + i) * NV + NX;
+            Qk[i] = dot(quu, kappa, OCP_M);
+            add_rows(half + i * NX, quu, 1, K, OCP_M, NX, (real)0.5);
+            for (j = 0; j < NX; ++j) {
+                half[i * NX + j] += Q[(NX + i) * NV + j];
             }
             *gain -= kappa[i] * (q[NX + i] + Qk[i] / 2);
         }
+        clear(sides, NX * NX);
+        add_transposed(sides, K, half, OCP_M, NX, NX);
         for (i = 0; i < NX; ++i) {
             real total = q[i];
             for (j = 0; j < OCP_M; ++j) {
@@ -755,15 +833,8 @@ static int backward(const task *s, real shift, real *gain, real *value, real *P,
             }
             v[i] = total;
             for (j = 0; j <= i; ++j) {
-                real entry = (Q[i * NV + j] + Q[j * NV + i]) / 2;
-                int m;
-                for (m = 0; m < OCP_M; ++m) {
-                    const real *qux = Q + (NX + m) * NV;
-                    entry += qux[i] * K[m * NX + j] + K[m * NX + i] * qux[j]
-                        + (K[m * NX + i] * QK[m * NX + j] + QK[m * NX + i] * K[m * NX + j]) / 2;
-                }
-                P[i * NX + j] = entry;
-                P[j * NX + i] = entry;
+                P[i * NX + j] = (Q[i * NV + j] + Q[j * NV + i]) / 2 + sides[i * NX + j] + sides[j * NX + i];
+                P[j * NX + i] = P[i * NX + j];
             }
         }
         if (!is_finite(v[0]) || !is_finite(P[0])) {
@@ -777,7 +848,7 @@ static int backward(const task *s, real shift, real *gain, real *value, real *P,
 static real forward(const task *s, real alpha)
 {
     workspace *w = s->w;
-    real total = 0, d[NX];
+    real total = 0, d[NX], inner[NS];
     int k, i;
     for (k = 0; k < OCP_N; ++k) {
         model_difference(w->x[k], w->x_new[k], d);
@@ -785,8 +856,8 @@ static real forward(const task *s, real alpha)
             const real u = w->u[k][i] + alpha * w->kappa[k][i] + dot(w->K[k] + i * NX, d, NX);
             w->u_new[k][i] = u > lower_bound[i] ? (u < upper_bound[i] ? u : upper_bound[i]) : lower_bound[i];
         }
-        step(w->x_new[k], w->u_new[k], row(s, k), time_of(s, k), OCP_H, w->x_new[k + 1]);
-        total += interval_cost(s, k, w->x_new[k], w->u_new[k], w->x_new[k + 1]);
+        step(w->x_new[k], w->u_new[k], row(s, k), time_of(s, k), OCP_H, w->x_new[k + 1], inner);
+        total += interval_cost(s, k, w->x_new[k], w->u_new[k], w->x_new[k + 1], OCP_INNER ? inner : w->x_new[k + 1]);
         total += path_terms(s, k, w->x_new[k], w->u_new[k]);
         if (!is_finite(total)) {
             return total;
@@ -845,7 +916,7 @@ static int roll_out(const task *s)
             const real u = w->u[k][i];
             w->u[k][i] = u > lower_bound[i] ? (u < upper_bound[i] ? u : upper_bound[i]) : lower_bound[i];
         }
-        step(w->x[k], w->u[k], row(s, k), time_of(s, k), OCP_H, w->x[k + 1]);
+        step(w->x[k], w->u[k], row(s, k), time_of(s, k), OCP_H, w->x[k + 1], NULL);
     }
     return all_finite(w->x[0], (OCP_N + 1) * NS);
 }
@@ -1039,7 +1110,7 @@ void OCP_(advance)(const real *x, const real *u, const real *p, real t, real h, 
     copy(next, x, NS);
     for (i = 0; i < parts; ++i) {
         copy(from, next, NS);
-        step(from, u, p, t + (real)i * h / (real)parts, h / (real)parts, next);
+        step(from, u, p, t + (real)i * h / (real)parts, h / (real)parts, next, NULL);
     }
 }
 
@@ -1087,13 +1158,13 @@ static void shift_plan(const task *s)
     int k;
     copy(at, w->x[0], NS);
     for (k = 0; rest > 0 && k < OCP_N; ++k, rest -= OCP_H) {
-        step(at, w->u[k], row(s, k), time_of(s, k), rest < OCP_H ? rest : OCP_H, next);
+        step(at, w->u[k], row(s, k), time_of(s, k), rest < OCP_H ? rest : OCP_H, next, NULL);
         copy(at, next, NS);
     }
     shift_in_time(w);
     copy(w->x[0], at, NS - 1);
     for (k = 0; k < OCP_N; ++k) {
-        step(w->x[k], w->u[k], row(s, k), time_of(s, k), OCP_H, w->x[k + 1]);
+        step(w->x[k], w->u[k], row(s, k), time_of(s, k), OCP_H, w->x[k + 1], NULL);
     }
 }
 
@@ -1129,7 +1200,7 @@ static void shift_plan(const task *s)
 #if OCP_NG > 0
     memmove(w->lambda, w->lambda + 1, (OCP_N - 1) * sizeof w->lambda[0]);
 #endif
-    step(w->x[OCP_N - 1], w->u[OCP_N - 1], row(s, OCP_N - 1), time_of(s, OCP_N - 1), OCP_H, w->x[OCP_N]);
+    step(w->x[OCP_N - 1], w->u[OCP_N - 1], row(s, OCP_N - 1), time_of(s, OCP_N - 1), OCP_H, w->x[OCP_N], NULL);
 }
 
 static void held_control(const workspace *w, real *u) { copy(u, w->u[0], OCP_M); }

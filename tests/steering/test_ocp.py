@@ -301,12 +301,56 @@ def test_a_plan_of_steer_is_a_guess() -> None:
     assert several.cost == pytest.approx(plan.cost, rel=1e-8)
 
 
-@pytest.mark.parametrize("make", [regulator, car, satellite], ids=["regulator", "car", "satellite"])
+def spinning(**options: Any) -> Any:
+    """A body with three torques, its cost by Simpson's rule."""
+    settings = {
+        "stage_cost": "3 - tr(X) + norm2(xi) + norm2(u)/2",
+        "quadrature": "simpson",
+        "name": "spinning",
+        **options,
+    }
+    return lc.ocp(
+        SO3,
+        dynamics="second_order",
+        inertia=(3.0, 2.0, 1.0),
+        controls=SO3.labels,
+        **{"duration": 2.0, "intervals": 8, **settings},
+    )
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("rkmk4", 4), ("midpoint", 2)])
+def test_the_state_within_an_interval_keeps_the_order_of_the_quadrature(integrator: str, order: int) -> None:
+    """The cost of given controls against SciPy's: Simpson's node in the middle is reached by the integrator's own interpolant."""
+    J, torque = np.array([3.0, 2.0, 1.0]), np.array([0.6, -0.4, 0.5])
+
+    def rate(_t: float, y: np.ndarray) -> np.ndarray:
+        X, w = y[:9].reshape(3, 3), y[9:12]
+        skew = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        cost = 3 - np.trace(X) + w @ w + torque @ torque / 2
+        return np.concatenate([(X @ skew).ravel(), (np.cross(J * w, w) + torque) / J, [cost]])
+
+    start = np.concatenate([rotation((0.3, 0.2, -0.5)).ravel(), [0.4, 0.9, -0.3, 0]])
+    true = solve_ivp(rate, (0, 2), start, rtol=1e-12, atol=1e-12).y[-1, -1]
+    errors = []
+    for intervals in (8, 16):
+        pinned = (torque, torque + 1e-13)
+        problem = spinning(
+            integrator=integrator, intervals=intervals, bounds=pinned, name=f"pinned_{integrator}_{intervals}"
+        )
+        plan = problem.solve(rotation((0.3, 0.2, -0.5)), xi=start[9:12], threads=1)
+        errors.append(abs(plan.cost - true))
+    assert order - 0.4 < np.log2(errors[0] / errors[1]) < order + 1.5
+
+
+@pytest.mark.parametrize(
+    "make", [regulator, car, satellite, spinning], ids=["regulator", "car", "satellite", "spinning"]
+)
 def test_without_a_compiler_numpy_does_the_same(make: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     values, first, most = {
         "regulator": ({"q": 1.0}, rotation((0.3, 1.9, 0)), 600),
         "car": ({"goal": planar(0.8, 3, 1)}, None, 4),
         "satellite": (SATELLITE, None, 3),
+        "spinning": ({"xi": (0.4, 0.9, -0.3)}, rotation((0.3, 1.9, 0)), 600),
     }[make.__name__]
     problem = make()
     compiled = problem.solve(first, iterations=most, threads=1, **values)

@@ -36,22 +36,21 @@ def budget_of(view: SolverView, iterations: int) -> Budget:
     s, N, m, nx = len(view.rk_a), view.intervals, view.m, view.nx
     nv, nc = nx + m, view.dim + nx + m
     inner = sum(1 for c in view.node_c if float(c.strip("()f")) not in (0.0, 1.0))
-    chain = s * (count["model_stage_jacobian"] + 2 * nx * nx * nv + 4 * nx * nv)
-    chain += count["model_move"] + count["model_move_jacobian"] + 2 * view.dim * view.dim * nv
+    stages = s * (count["model_stage_jacobian"] + 2 * nx * nx * nv + (4 + 2 * inner) * nx * nv)
+    place = count["model_move"] + count["model_move_jacobian"] + 2 * view.dim * view.dim * nv
     if view.second_order:
-        chain += (
-            s * (count["model_stage_hessian"] + 2 * nc * nv * (nc + nv) + 2 * nx * nx) + count["model_move_hessian"]
-        )
-        chain += 4 * view.dim * nv * (nv + view.dim) + count["model_cost_exact"] + count.get("model_path_hessian", 0)
+        stages += s * (count["model_stage_hessian"] + 2 * nc * nv * (nc + nv) + 2 * nx * nx)
+        stages += count.get("model_path_hessian", 0)
+        place += count["model_move_hessian"] + 4 * view.dim * nv * (nv + view.dim) + count["model_cost_exact"]
     pulled = 2 * (2 * nv**3) + 2 * nv * nv
-    stage = (1 + inner) * (chain + pulled) + len(view.node_c) * (count["model_cost_square"] + 2 * nv * nv)
+    stage = stages + (1 + inner) * (place + pulled) + len(view.node_c) * (count["model_cost_square"] + 2 * nv * nv)
     stage += count.get("model_path_jacobian", 0) + view.path * (2 * nv * nv + 2 * nv)
     newton = m**3 // 3 + 8 * m * m
     gains = nx * 2 * m * m + 4 * m * m * nx + 8 * m * nx * nx // 2
     sweep = N * (stage + newton + gains)
     longest = N * (stage + _NEWTON * (newton + 12 * 2 * m * m) + gains)
-    step = s * (count["model_stage"] + 3 * nx) + count["model_move"]
-    roll = step * (1 + inner) + count["model_difference"] + len(view.node_c) * count["model_cost"]
+    step = s * (count["model_stage"] + (3 + 2 * inner) * nx) + (1 + inner) * count["model_move"]
+    roll = step + count["model_difference"] + len(view.node_c) * count["model_cost"]
     roll += count.get("model_path", 0) + 6 * view.path + m * (2 * nx + 4)
     rollout = N * roll + count["model_end_cost"] + count.get("model_end", 0)
     shifts = 2 * N * step if view.durations else step
@@ -59,7 +58,12 @@ def budget_of(view: SolverView, iterations: int) -> Budget:
     size = 4 if view.real == "float" else 8
     arrays = 4 * nv * nv + 2 * nv + nx * nv + nx * nx  # Q, W, H and the pulled-back block; gradients; J; P
     arrays += (
-        s * (nx + nx * nv + nx * nc) + nx * nv + 2 * view.dim**2 + 2 * nx * nv + nx * nx + view.dim**2
+        s * (2 * nx + nx * nv + nx * nc)
+        + (1 + inner) * nx * nv
+        + 2 * view.dim**2
+        + nx * nv
+        + (m + nx) * nx
+        + view.dim**2
     )  # the chain
     arrays += max(nc, nv) * nv + 3 * view.stored + view.path * (nv + 2) + view.end * (nx + 2) + 8 * m * m
     return Budget(

@@ -58,7 +58,9 @@ class InterpretedMerit(Machine):
         total = 0.0
         for c, weight in self.model.nodes:
             p, t = run.row(k + (c == 1)), self._time(run, k) + c * self.h
-            at = x if c == 0 else following if c == 1 else self.model.step(x, u, p, self._time(run, k), c * self.h)
+            at = x if c == 0 else following
+            if 0 < c < 1:
+                at = self.model.step(x, u, p, self._time(run, k), self.h, self.model.inner)
             total += weight * self.model.cost(at, u, p, t)
         return total
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,25 @@ from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.model_sizes import Model
 from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
 
-#: Arguments, their derivatives and the stages' own derivatives, the total and its derivative, Ad(exp(-total)), the right Jacobian.
-Chain = tuple[list[Array], list[Array], list[Array], Array, Array, Array, Array]
+
+class Stages(NamedTuple):
+    """Of each stage of a step: its argument and that by (d, u), its derivative by its own arguments, its slope and that by (d, u)."""
+
+    y: list[Array]
+    Y: list[Array]
+    S: list[Array]
+    k: list[Array]
+    K: list[Array]
+
+
+class Place(NamedTuple):
+    """Where stages lead by weights: the total and its derivative, Ad(exp(-total)), the right Jacobian."""
+
+    weights: tuple[float, ...]
+    total: Array
+    slope: Array
+    Ad: Array
+    right: Array
 
 
 class InterpretedModel:
@@ -23,6 +40,7 @@ class InterpretedModel:
         self.functions = {function.name(): function for function in model.functions}
         self.second_order = "model_move_hessian" in self.functions
         self.a, self.b, self.c = data.tableau
+        self.inner = data.inner_weights
         h = data.duration / data.intervals
         self.nodes = tuple((c, weight * h) for c, weight in QUADRATURES[data.quadrature])
         self.needs_control = np.array(model.needs_control, dtype=bool)
@@ -44,61 +62,67 @@ class InterpretedModel:
         """Rows of g that no control can change: at the start those of the state alone."""
         return ~self.needs_control if k == 0 else np.zeros(len(self.needs_control), dtype=bool)
 
-    def step(self, x: Array, u: Array, p: Array, t: float, h: float) -> Array:
-        """x_{k+1}."""
+    def step(self, x: Array, u: Array, p: Array, t: float, h: float, weights: tuple[float, ...] | None = None) -> Array:
+        """x_{k+1}, or what the stages reach by other weights."""
         k, total = np.zeros(self.sizes.nx), np.zeros(self.sizes.nx)
-        for a, b, c in zip(self.a, self.b, self.c, strict=True):
+        for a, b, c in zip(self.a, weights or self.b, self.c, strict=True):
             k = self._run("model_stage", x, h * a * k, u, p, t + c * h)[0]
             total = total + h * b * k
         return self._run("model_move", x, total)[0]
 
-    def linear_step(self, x: Array, u: Array, p: Array, t: float, h: float) -> tuple[Array, Array, Chain]:
-        """x_{k+1}, (nv, nv) the derivative of (x_{k+1}, u) by (d, u), and what its second order needs."""
+    def linear_stages(self, x: Array, u: Array, p: Array, t: float, h: float) -> Stages:
+        """The stages of a step with their derivatives by (d, u)."""
         n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
         y, Y = np.zeros(nx), np.zeros((nx, nx + m))
-        total, slope = np.zeros(nx), np.zeros((nx, nx + m))
-        arguments: list[Array] = []
-        slopes: list[Array] = []
-        stages: list[Array] = []
+        found = Stages([], [], [], [], [])
         k, K = np.zeros(nx), np.zeros((nx, nx + m))
-        for a, b, c in zip(self.a, self.b, self.c, strict=True):
+        for a, c in zip(self.a, self.c, strict=True):
             y, Y = h * a * k, h * a * K
             k, flat = self._run("model_stage_jacobian", x, y, u, p, t + c * h)
             S = flat.reshape(nx, 2 * n + nx - n + m)
             K = np.hstack([S[:, :n], S[:, 2 * n :]]) + S[:, n : n + nx] @ Y
-            total, slope = total + h * b * k, slope + h * b * K
-            arguments.append(y)
-            slopes.append(Y)
-            stages.append(S)
+            for kept, value in zip(found, (y, Y, S, k, K), strict=True):
+                kept.append(value)
+        return found
+
+    def reached(self, x: Array, stages: Stages, h: float, weights: tuple[float, ...]) -> tuple[Array, Array, Place]:
+        """The state that the stages reach by weights, (nv, nv) the derivative of (it, u) by (d, u), and what its second order needs."""
+        n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
+        total = sum((h * b * k for b, k in zip(weights, stages.k, strict=True)), np.zeros(nx))
+        slope = sum((h * b * K for b, K in zip(weights, stages.K, strict=True)), np.zeros((nx, nx + m)))
         Ad, right = (flat.reshape(n, n) for flat in self._run("model_move_jacobian", total))
         J = np.zeros((nx + m, nx + m))
         J[:n], J[n:nx] = right @ slope[:n], slope[n:]
         J[:n, :n] += Ad
         J[n:, n:] += np.eye(nx - n + m)
-        following = self._run("model_move", x, total)[0]
-        return following, J, (arguments, slopes, stages, total, slope, Ad, right)
+        return self._run("model_move", x, total)[0], J, Place(weights, total, slope, Ad, right)
 
-    def curvature(self, x: Array, u: Array, p: Array, t: float, h: float, chain: Chain, mu: Array) -> Array:
-        """(nv, nv) Hessian of mu . F."""
+    def end_curvature(self, place: Place, mu: Array, h: float) -> tuple[Array, Array]:
+        """Of the Hessian of mu . F at a place, (nv, nv) the part of the end of the chain, and (stages, nx) what mu asks of the stages."""
         n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
-        arguments, slopes, stages, total, slope, Ad, right = chain
+        weights, total, slope, Ad, right = place
         direct = np.hstack([np.eye(n), np.zeros((n, nx - n + m))])
         S, C = (flat.reshape(n, n) for flat in self._run("model_move_hessian", total, mu))
         mixed = direct.T @ Ad.T @ C @ right @ slope[:n] / 2
-        H = slope[:n].T @ S @ slope[:n] + mixed + mixed.T
         nu = np.concatenate([right.T @ mu[:n], mu[n:]])
-        back = np.zeros(nx)
+        return slope[:n].T @ S @ slope[:n] + mixed + mixed.T, h * np.outer(weights, nu)
+
+    def stage_curvature(self, x: Array, u: Array, p: Array, t: float, h: float, stages: Stages, loads: Array) -> Array:
+        """(nv, nv) the stages' part of those Hessians."""
+        n, nx, m = self.sizes.dim, self.sizes.nx, self.sizes.m
+        direct = np.hstack([np.eye(n), np.zeros((n, nx - n + m))])
+        H, back = np.zeros((nx + m, nx + m)), np.zeros(nx)
         others = np.hstack([np.zeros((nx - n + m, n)), np.eye(nx - n + m)])
         for s in range(len(self.a) - 1, -1, -1):
-            weights = h * self.b[s] * nu + back
+            weights = loads[s] + back
             size = 2 * n + nx - n + m
             time = t + self.c[s] * h
-            curve = self._run("model_stage_hessian", x, arguments[s], u, p, time, weights)[0].reshape(size, size)
+            curve = self._run("model_stage_hessian", x, stages.y[s], u, p, time, weights)[0].reshape(size, size)
             rest = others.copy()
-            rest[: nx - n] += slopes[s][n:]
-            L = np.vstack([direct, slopes[s][:n], rest])
+            rest[: nx - n] += stages.Y[s][n:]
+            L = np.vstack([direct, stages.Y[s][:n], rest])
             H = H + L.T @ curve @ L
-            back = h * self.a[s] * stages[s][:, n : n + nx].T @ weights
+            back = h * self.a[s] * stages.S[s][:, n : n + nx].T @ weights
         return np.asarray(H)
 
     def difference(self, x: Array, other: Array) -> Array:

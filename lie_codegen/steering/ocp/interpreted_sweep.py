@@ -32,6 +32,8 @@ class InterpretedSweep(InterpretedMerit):
         nv, value = nx + m, 0.0
         Q, q, W, w = np.zeros((nv, nv)), np.zeros(nv), np.zeros((nv, nv)), np.zeros(nv)
         W[:nx, :nx], w[:nx] = P, v
+        stages = model.linear_stages(x, u, p, t, self.h)
+        loads = np.zeros((len(stages.k), nx))
         for c, weight in model.nodes:
             if c == 0:
                 cost, g, H = model.cost_model(x, u, p, t, exact=run.exact)
@@ -41,17 +43,19 @@ class InterpretedSweep(InterpretedMerit):
                 cost, g, H = model.cost_model(ahead, u, run.row(k + 1), t + self.h, exact=run.exact)
                 value, w, W = value + weight * cost, w + weight * g, W + weight * H
             else:
-                middle, J, chain = model.linear_step(x, u, p, t, c * self.h)
-                cost, g, H = model.cost_model(middle, u, p, t + c * self.h, exact=run.exact)
+                inner, J, place = model.reached(x, stages, self.h, model.inner)
+                cost, g, H = model.cost_model(inner, u, p, t + c * self.h, exact=run.exact)
                 value += weight * cost
                 q, Q = q + weight * J.T @ g, Q + weight * J.T @ H @ J
                 if run.exact:
-                    Q = Q + model.curvature(x, u, p, t, c * self.h, chain, weight * g[:nx])
+                    curve, asked = model.end_curvature(place, weight * g[:nx], self.h)
+                    Q, loads = Q + curve, loads + asked
         # The value one step on, (w, W), is pulled back through the step: J^T W J alone is Gauss-Newton, the exact form adds w times the second derivative of the step.
-        _, J, chain = model.linear_step(x, u, p, t, self.h)
+        _, J, place = model.reached(x, stages, self.h, model.b)
         q, Q = q + J.T @ w, Q + J.T @ W @ J
         if run.exact:
-            Q = Q + model.curvature(x, u, p, t, self.h, chain, w[:nx])
+            curve, asked = model.end_curvature(place, w[:nx], self.h)
+            Q = Q + curve + model.stage_curvature(x, u, p, t, self.h, stages, loads + asked)
         g, G = model.path_jacobian(x, u, p, t, nv)
         lam, rho = run.space["lambda"][k][: len(g)], float(run.space["rho"])
         # Augmented Lagrangian of g <= 0: (max(0, lambda + rho g)^2 - lambda^2) / (2 rho), whose second derivative lives where it is pressed.

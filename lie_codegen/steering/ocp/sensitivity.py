@@ -195,7 +195,7 @@ def _forward(
         du = gain[k] @ d
         changes.append(du)
         u, h = np.asarray(plan.u[k]), data.duration / data.intervals
-        _, J, _ = model.linear_step(x, u, rows[k, kept], k * h, h)
+        _, J, _ = model.reached(x, model.linear_stages(x, u, rows[k, kept], k * h, h), h, model.b)
         d = J[:size, :size] @ d + J[:size, size:] @ du
         d[nx:] = parameter
     return np.array(changes)

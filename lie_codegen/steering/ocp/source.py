@@ -48,6 +48,7 @@ class SolverView:
     plans: bool
     rk_a: tuple[str, ...]
     rk_b: tuple[str, ...]
+    rk_inner: tuple[str, ...]
     rk_c: tuple[str, ...]
     node_c: tuple[str, ...]
     node_w: tuple[str, ...]
@@ -107,6 +108,7 @@ def solver_view(
         plans=plans,
         rk_a=literals(a),
         rk_b=literals(b),
+        rk_inner=literals(data.inner_weights),
         rk_c=literals(c),
         node_c=literals(node for node, _ in nodes),
         node_w=literals(weight * h for _, weight in nodes),
