@@ -93,14 +93,13 @@ def _qubits(count: int) -> MatrixGroup:
 
 
 def _seeds(duration: float, bound: float) -> Callable[[], float]:
-    """Of 12 seeds, a start for each phase of a CNOT and a round, how many arrive."""
+    """Of 12 seeds, a start for each phase of a CNOT in a round, how many arrive."""
     options: dict[str, Any] = {
         "drift": {"ZZ": 1},
         "bounds": bound,
         "pieces": 30,
         "objective": "none",
         "starts": 1,
-        "rounds": 1,
     }
 
     def count() -> float:
