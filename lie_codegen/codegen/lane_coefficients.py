@@ -98,6 +98,28 @@ POLYNOMIALS: dict[str, tuple[str, tuple[float, ...], float]] = {
     ),
 }
 
+#: For lanes of floats.
+FLOAT_POLYNOMIALS: dict[str, tuple[str, tuple[float, ...], float]] = {
+    "SIN": (
+        "sin r = r + r z p(z), z = r^2, |r| <= pi/4",
+        (
+            -0.16666655,
+            0.008332178,
+            -0.00019517083,
+        ),
+        -27.9,
+    ),
+    "COS": (
+        "cos r = 1 - z/2 + z^2 p(z), z = r^2, |r| <= pi/4",
+        (
+            0.041666646,
+            -0.0013887328,
+            2.443422e-05,
+        ),
+        -33.0,
+    ),
+}
+
 #: pi/2 and log 2 as sums: full doubles where products are fused, else parts whose multiples are exact.
 HALF_PI: tuple[float, ...] = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
 HALF_PI_PARTS: tuple[float, ...] = (
@@ -107,3 +129,5 @@ HALF_PI_PARTS: tuple[float, ...] = (
     8.4784276603689e-32,
 )
 LOG2_PARTS: tuple[float, ...] = (0.6931471803691238, 1.9082149292705877e-10)
+#: pi/2 as a sum of floats.
+HALF_PI_FLOATS: tuple[float, ...] = (1.570796251296997, 7.549789415861596e-08, 5.390302529957765e-15)

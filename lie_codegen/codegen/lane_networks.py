@@ -30,22 +30,28 @@ class Network:
 
 @dataclass(frozen=True)
 class LaneNetworks:
-    """All that one number of lanes needs: records smaller than it, and the square transposition."""
+    """All that one number of lanes needs: records smaller than it, the square transposition, that of half as many columns, and the places
+    of (low, low), (low, high), (high, low), (high, high) halves of two vectors.
+    """
 
     lanes: int
     loads: tuple[Network, ...]
     stores: tuple[Network, ...]
     square: Network
+    half_square: Network
+    picks: tuple[tuple[int, ...], ...]
 
 
 def networks(lanes: int) -> LaneNetworks:
     """The networks for that many lanes, a power of two."""
-    sizes = range(1, lanes)
+    sizes, half = range(1, lanes), lanes // 2
     return LaneNetworks(
         lanes=lanes,
         loads=tuple(_Maker(lanes).network(size, load=True) for size in sizes),
         stores=tuple(_Maker(lanes).network(size, load=False) for size in sizes),
-        square=_Maker(lanes).square(),
+        square=_Maker(lanes).square(lanes),
+        half_square=_Maker(lanes).square(half),
+        picks=tuple((*range(a, a + half), *range(b, b + half)) for a in (0, half) for b in (lanes, lanes + half)),
     )
 
 
@@ -61,21 +67,21 @@ class _Maker:
         results = self._apart(names) if load else self._together(names)
         return Network(size, tuple(self._steps), tuple(results))
 
-    def square(self) -> Network:
-        """Swaps bit after bit of the row index with that of the column index."""
+    def square(self, rows: int) -> Network:
+        """Swaps bit after bit of the row index with that of the column index; of fewer rows than lanes, squares beside one another."""
         # A transposition exchanges row and column index, and so does exchanging their bits one after the other: for bit b the entry
         # (row without b, column with b) goes to (row with b, column without b). Each takes one shuffle a vector: log2(L) in all.
-        names = [f"a{k}" for k in range(self._lanes)]
+        names = [f"a{k}" for k in range(rows)]
         bit = 1
-        while bit < self._lanes:
-            for row in range(self._lanes):
+        while bit < rows:
+            for row in range(rows):
                 if not row & bit:
                     pair = (names[row], names[row | bit])
                     low = [p if not p & bit else self._lanes + (p ^ bit) for p in range(self._lanes)]
                     high = [p | bit if not p & bit else self._lanes + p for p in range(self._lanes)]
                     names[row], names[row | bit] = self._mix(*pair, low), self._mix(*pair, high)
             bit *= 2
-        return Network(self._lanes, tuple(self._steps), tuple(names))
+        return Network(rows, tuple(self._steps), tuple(names))
 
     def _mix(self, first: str, second: str, picks: Sequence[int]) -> str:
         name = f"b{len(self._steps)}"

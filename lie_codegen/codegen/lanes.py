@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
-import numpy as np
-
-from lie_codegen.codegen.lane_coefficients import HALF_PI, HALF_PI_PARTS, LOG2_PARTS, POLYNOMIALS
 from lie_codegen.codegen.lane_forms import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, OF_MASKS, SLOW_FORMS
-from lie_codegen.codegen.lane_networks import networks
-from lie_codegen.codegen.opcodes import c_literal
+from lie_codegen.codegen.opcodes import C99, Target
 from lie_codegen.codegen.reciprocals import with_shared_reciprocals
 from lie_codegen.codegen.skips import Skip, with_skips
 from lie_codegen.codegen.split import split
 from lie_codegen.codegen.tape import Statement, Tape
-from lie_codegen.codegen.templates import render
 from lie_codegen.errors import CodegenError
 
 #: Statements from which a body is a function of its own.
@@ -129,15 +123,10 @@ class LaneBody:
         return lines
 
 
-@dataclass(frozen=True)
-class _Polynomial:
-    about: str
-    coefficients: tuple[str, ...]
-    error: str
-
-
-def lane_body(tape: Tape, sizes: Sequence[int]) -> LaneBody:
+def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBody:
     """The lane form of a tape with input ports of these sizes; a long one in parts, a short one with its twin.
+
+    The names are those of lanes of doubles, the constants those of the target; `in_floats` rewrites the names.
 
     Raises:
         CodegenError: an operation has none, not even lane by lane.
@@ -146,15 +135,15 @@ def lane_body(tape: Tape, sizes: Sequence[int]) -> LaneBody:
     tape = with_shared_reciprocals(tape)
     pieces = split(tape, ports)
     if pieces is None:
-        body = _body(tape)
-        return replace(body, twin=_twin(tape, sizes)) if body.size < TWIN else body
+        body = _body(tape, target)
+        return replace(body, twin=_twin(tape, sizes, target)) if body.size < TWIN else body
     parts = []
     for part in pieces.parts:
-        body = _body(part.tape, ports)
+        body = _body(part.tape, target, ports)
         moved = [replace(store, entry=place) for store, place in zip(body.stores, part.places, strict=True)]
         parts.append(replace(body, stores=tuple(moved)))
     return replace(
-        _body(pieces.last, ports),
+        _body(pieces.last, target, ports),
         slow=tuple(sorted({op for part in parts for op in part.slow})),
         read=frozenset().union(*(part.read for part in parts)) - {ports},
         parts=tuple(parts),
@@ -162,16 +151,16 @@ def lane_body(tape: Tape, sizes: Sequence[int]) -> LaneBody:
     )
 
 
-def _twin(tape: Tape, sizes: Sequence[int]) -> LaneBody:
-    emitter = _Emitter(tape, -1, _Names("s", "q", tuple(sizes)))
+def _twin(tape: Tape, sizes: Sequence[int], target: Target) -> LaneBody:
+    emitter = _Emitter(tape, target, -1, _Names("s", "q", tuple(sizes)))
     body = _emitted(tape, emitter)
     return replace(
         body, stores=tuple(replace(store, entry=store.entry + len(tape.outputs[store.port])) for store in body.stores)
     )
 
 
-def _body(tape: Tape, work: int = -1) -> LaneBody:
-    return _emitted(tape, _Emitter(tape, work))
+def _body(tape: Tape, target: Target, work: int = -1) -> LaneBody:
+    return _emitted(tape, _Emitter(tape, target, work))
 
 
 def _emitted(tape: Tape, emitter: _Emitter) -> LaneBody:
@@ -204,7 +193,8 @@ class _Names:
 class _Emitter:
     """Names of values, as numbers and as masks."""
 
-    def __init__(self, tape: Tape, work: int, names: _Names = _Names()) -> None:
+    def __init__(self, tape: Tape, target: Target, work: int, names: _Names = _Names()) -> None:
+        self._target = target
         self._work = work
         self._names = names
         self.done: list[LaneStatement | LaneBlock] = []
@@ -224,7 +214,7 @@ class _Emitter:
     def emit(self, index: int, statement: Statement) -> None:
         op, operands = statement.op, statement.operands
         if op == "CONST":
-            self._numbers[index] = f"lcg_splat({c_literal(statement.value)})"
+            self._numbers[index] = f"lcg_splat({self._target.literal(statement.value)})"
         elif op == "INPUT":
             port, entry = statement.slot
             shift = self._names.shifts[port] if self._names.shifts else 0
@@ -271,7 +261,11 @@ class _Emitter:
         name = f"{self._names.value}{index}"
         condition = self._mask(statement.operands[0])
         arguments = ", ".join(self.number(i) for i in statement.operands[1:])
-        expression = f"LCG_CALL({routine.name}, {routine.inputs}, {routine.outputs}, {condition}, {name}, {arguments})"
+        # A routine without settings for single precision computes in double whatever calls it.
+        real = "LCG_ALWAYS_DOUBLE" if routine.single is None else "double"
+        expression = (
+            f"LCG_CALL({real}, {routine.name}, {routine.inputs}, {routine.outputs}, {condition}, {name}, {arguments})"
+        )
         self.done.append(LaneStatement("lcg_v", name, expression, routine.outputs))
         self._numbers[index] = name
 
@@ -279,28 +273,3 @@ class _Emitter:
         name = f"{self._names.value}{index}"
         self.done.append(LaneStatement(kind, name, expression))
         (self._masks if kind == "lcg_m" else self._numbers)[index] = name
-
-
-@cache
-def lanes_header() -> str:
-    """The C header that lane bodies need; the same for all kernels."""
-    polynomials = [
-        (name, _Polynomial(about, _literals(coefficients), repr(error)))
-        for name, (about, coefficients, error) in POLYNOMIALS.items()
-    ]
-    constants = {
-        "two_over_pi": c_literal(2 / np.pi),
-        "one_over_log2": c_literal(1 / np.log(2)),
-        "half_pi": _literals(HALF_PI),
-        "pi": _literals([2 * part for part in HALF_PI]),
-        "quarter_pi": _literals([part / 2 for part in HALF_PI]),
-        "half_pi_parts": _literals(HALF_PI_PARTS),
-        "log2_parts": _literals(LOG2_PARTS),
-    }
-    return render(
-        "lanes.h.jinja", polynomials=polynomials, constants=constants, networks=[networks(n) for n in (8, 4, 2)]
-    )
-
-
-def _literals(values: Sequence[float]) -> tuple[str, ...]:
-    return tuple(c_literal(float(value)) for value in values)

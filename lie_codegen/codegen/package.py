@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from lie_codegen.codegen.lanes import lane_body, lanes_header
+from lie_codegen.codegen.lane_headers import in_floats, lanes_float_header, lanes_header
+from lie_codegen.codegen.lanes import lane_body
 from lie_codegen.codegen.library_sources import LibrarySources
 from lie_codegen.codegen.numerics import NUMERICS_VERSION
 from lie_codegen.codegen.opcodes import REALS, Target
@@ -100,32 +101,37 @@ def _declared(header: str) -> list[tuple[str, str, str]]:
     return [(name, " ".join(declaration.split()), " ".join(comment.split())) for comment, declaration, name in found]
 
 
-def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
-    """The sources of the shared library that Python loads: the package's own, and the entry points.
+def render_library(namespace: str, kernels: Sequence[Kernel], real: str = "double") -> LibrarySources:
+    """The sources of the shared library that Python loads: the package's own, and the entry points; over doubles or floats.
 
     Raises:
         CodegenError, IdentifierError: as in `lie_codegen.codegen.generate`.
     """
     _check(namespace, kernels)
-    tapes = [tape_of(kernel) for kernel in kernels]
-    view = package_view(namespace, kernels, tapes, PackageMetadata())
+    target = REALS[real]
+    tapes = [tape_of(kernel, real) for kernel in kernels]
+    view = package_view(namespace, kernels, tapes, PackageMetadata(), target)
     bodies = [
-        lane_body(tape, [port.size for port in kernel.inputs]) for kernel, tape in zip(kernels, tapes, strict=True)
+        lane_body(tape, [port.size for port in kernel.inputs], target)
+        for kernel, tape in zip(kernels, tapes, strict=True)
     ]
+    header = "lie_codegen_lanes.h" if real == "double" else "lie_codegen_lanes_float.h"
+    reduces = any(kernel.is_step and len(kernel.outputs) > 1 for kernel in view.kernels)
+    both = list(zip(view.kernels, bodies, strict=True))
+    binding = render("binding.c.jinja", package=view, kernels=both, header=header, reduces=reduces)
     files = {
         f"{namespace}.h": render("header.h.jinja", package=view),
         f"{namespace}.c": render("source.c.jinja", package=view),
         "lie_codegen_lanes.h": lanes_header(),
-        f"{namespace}_binding.c": render(
-            "binding.c.jinja", package=view, kernels=list(zip(view.kernels, bodies, strict=True))
-        ),
+        **({} if real == "double" else {header: lanes_float_header()}),
+        f"{namespace}_binding.c": binding if real == "double" else in_floats(binding),
     }
     return LibrarySources(
         namespace=namespace,
         files=files,
         main=f"{namespace}_binding.c",
         statements=max(len(tape.statements) for tape in tapes),
-        signatures=library_signatures(kernels),
+        signatures=library_signatures(kernels, real),
         notes=tuple(
             f"{kernel.name}: batches call libm lane by lane for {', '.join(body.slow)}"
             for kernel, body in zip(kernels, bodies, strict=True)
@@ -134,11 +140,13 @@ def render_library(namespace: str, kernels: Sequence[Kernel]) -> LibrarySources:
     )
 
 
-def library_signatures(kernels: Sequence[Kernel]) -> tuple[Signature, ...]:
+def library_signatures(kernels: Sequence[Kernel], real: str = "double") -> tuple[Signature, ...]:
     """The signatures; a name that two namespaces share gives way to the symbol."""
     names = [kernel.name for kernel in kernels]
     return tuple(
-        replace(Signature.of(kernel), name=kernel.symbol) if names.count(kernel.name) > 1 else Signature.of(kernel)
+        replace(Signature.of(kernel, real), name=kernel.symbol)
+        if names.count(kernel.name) > 1
+        else Signature.of(kernel, real)
         for kernel in kernels
     )
 
@@ -163,7 +171,7 @@ def _check_symbols(namespace: str, kernels: Sequence[Kernel]) -> None:
     owner: dict[str, str] = {}
     for kernel in kernels:
         suffixes = ("", "_call", "_batch", "_lanes") + (
-            ("_scan", "_scan_batch") if is_step(kernel.inputs, kernel.outputs) else ()
+            ("_scan", "_scan_batch", "_reduce") if is_step(kernel.inputs, kernel.outputs) else ()
         )
         for suffix in suffixes:
             symbol = kernel.symbol + suffix

@@ -12,7 +12,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 
 @dataclass(frozen=True)
 class Signature:
-    """Name, C symbol, ports and documentation of a compiled kernel."""
+    """Name, C symbol, ports and documentation of a compiled kernel; `real`: "double", or "float" where it computes in floats."""
 
     name: str
     symbol: str
@@ -20,15 +20,19 @@ class Signature:
     outputs: tuple[Port, ...]
     formula: str = ""
     source: str = ""
+    real: str = "double"
 
     @staticmethod
-    def of(kernel: Kernel) -> Signature:
+    def of(kernel: Kernel, real: str = "double") -> Signature:
         """The signature of a kernel."""
-        return Signature(kernel.name, kernel.symbol, kernel.inputs, kernel.outputs, kernel.formula, kernel.source)
+        return Signature(kernel.name, kernel.symbol, kernel.inputs, kernel.outputs, kernel.formula, kernel.source, real)
 
     def to_json(self) -> dict[str, Any]:
         """As a JSON object."""
-        return asdict(self)
+        data = asdict(self)
+        if self.real == "double":
+            del data["real"]  # what was written before floats were is still found
+        return data
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> Signature:
@@ -40,6 +44,7 @@ class Signature:
             outputs=_ports(data["outputs"]),
             formula=data["formula"],
             source=data["source"],
+            real=data.get("real", "double"),
         )
 
 

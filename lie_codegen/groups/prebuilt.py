@@ -27,7 +27,14 @@ if TYPE_CHECKING:
 #: The file that every kernel includes, and the name it is stored by.
 SHARED, SHARED_STORE = "lie_codegen_lanes.h", "lanes"
 #: What becomes C text beside the functions.
-TEMPLATES = ("binding.c.jinja", "header.h.jinja", "lanes.h.jinja", "macros.jinja", "source.c.jinja")
+TEMPLATES = (
+    "binding.c.jinja",
+    "header.h.jinja",
+    "lanes.h.jinja",
+    "lanes_records.h.jinja",
+    "macros.jinja",
+    "source.c.jinja",
+)
 _NOT_USED = "the C that ships with the package is damaged and not used: groups are derived again (the same results, seconds later; install it anew)"
 _PACKAGE = Path(__file__).resolve().parent.parent
 

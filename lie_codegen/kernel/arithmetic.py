@@ -70,6 +70,11 @@ def unit_roundoff(ops: Arithmetic) -> float:
     return float(getattr(ops, "unit_roundoff", ROUNDOFF["double"]))
 
 
+def terms(ops: Arithmetic, double: int, single: int) -> int:
+    """How many terms of a series are summed: in doubles, or where the numbers are floats, of which further terms are no part."""
+    return double if unit_roundoff(ops) == ROUNDOFF["double"] else single
+
+
 class FloatArithmetic:
     """Python floats: the plain meaning of a kernel, without any library."""
 

@@ -12,13 +12,15 @@ from fractions import Fraction
 from functools import cache
 from math import comb
 
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar, terms
 from lie_codegen.kernel.structural_zeros import is_zero
 
 #: |z| below which pole and series are used: beyond pi^2, the principal domain of a rotation's logarithm.
 SWITCH = 12
 #: The series has the ratio z / (16 pi^2) < 0.076: the first term left out is below 1e-20.
 TERMS = 17
+#: In floats: below 1e-9.
+FLOAT_TERMS = 8
 
 
 class CotangentFunctions:
@@ -34,6 +36,7 @@ class CotangentFunctions:
         self.near = ops.less(size, SWITCH)
         self.inner = ops.where(self.near, z, 1)
         self.outer = ops.where(self.near, SWITCH, z)
+        self._inverse = 1 / (ops.constant(four_pi_squared()) - self.inner)  # one division for all remainders
         self.signed = signed
         self._outer: dict[tuple[int, int], Scalar] = {}
 
@@ -52,11 +55,11 @@ class CotangentFunctions:
             if order == 0:
                 return 1 + mu * self._near_tail(1, 0)
             return self._near_tail(1, order - 1) + mu * self._near_tail(1, order)
-        pole = ops.constant(four_pi_squared())
         # 2 / (pole + mu), shifted down a - 1 places and differentiated: the geometric series is its own remainder.
         scale = Fraction(2) * (-1) ** (a - 1 + order) / four_pi_squared() ** (a - 1)
-        fraction = ops.constant(scale) / _power(pole + mu, order + 1)
-        coefficients = [remainder(j) * comb(j - a + 1, order) for j in range(a - 1 + order, a - 1 + order + TERMS)]
+        fraction = ops.constant(scale) * _power(self._inverse, order + 1)
+        count = terms(ops, TERMS, FLOAT_TERMS)
+        coefficients = [remainder(j) * comb(j - a + 1, order) for j in range(a - 1 + order, a - 1 + order + count)]
         series: Scalar = ops.constant(coefficients[-1])
         for value in reversed(coefficients[:-1]):
             series = series * mu + ops.constant(value)

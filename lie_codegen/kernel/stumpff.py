@@ -11,16 +11,19 @@ from __future__ import annotations
 from fractions import Fraction
 from math import factorial
 
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar, terms
 from lie_codegen.kernel.structural_zeros import is_zero
 
 #: |z| below which the two highest functions are summed as series; above it sine and cosine go up the recurrence.
 SWITCH = 1
 #: With the switch at 1 the first term left out is below 1e-19 relative, and below 1e-16 in second derivatives.
 TERMS = 10
+#: In floats: 2e-12, and 5e-10 in second derivatives.
+FLOAT_TERMS = 7
 #: Kernels that climb beyond c_3 switch later: each step of the recurrence from c_0 up divides rounding errors by z.
 HIGH_SWITCH = 6
 HIGH_TERMS = 18
+HIGH_FLOAT_TERMS = 10
 
 
 class StumpffFunctions:
@@ -74,8 +77,8 @@ class StumpffFunctions:
         return values
 
     def _series(self, k: int) -> Scalar:
-        terms = HIGH_TERMS if self.high else TERMS
-        coefficients = [Fraction((-1) ** j, factorial(2 * j + k)) for j in range(terms)]
+        count = terms(self.ops, *((HIGH_TERMS, HIGH_FLOAT_TERMS) if self.high else (TERMS, FLOAT_TERMS)))
+        coefficients = [Fraction((-1) ** j, factorial(2 * j + k)) for j in range(count)]
         total: Scalar = self.ops.constant(coefficients[-1])
         for value in reversed(coefficients[:-1]):
             total = total * self.z + self.ops.constant(value)

@@ -9,17 +9,20 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.errors import ShapeError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.outputs import empty
 
-REAL = np.dtype(np.float64)
-COMPLEX = np.dtype(np.complex128)
+#: The name of a real type -> (of real entries, of complex ones).
+DTYPES: dict[str, tuple[np.dtype[Any], np.dtype[Any]]] = {
+    "double": (np.dtype(np.float64), np.dtype(np.complex128)),
+    "float": (np.dtype(np.float32), np.dtype(np.complex64)),
+}
 
 
-def dtype_of(port: Port) -> np.dtype[Any]:
-    """float64 or complex128."""
-    return COMPLEX if port.is_complex else REAL
+def dtype_of(port: Port, real: str = "double") -> np.dtype[Any]:
+    """float64 or complex128; in floats float32 or complex64."""
+    return DTYPES[real][port.is_complex]
 
 
 def bind(signature: Signature, args: Sequence[Any], named: Mapping[str, Any]) -> list[Any]:
@@ -44,13 +47,14 @@ def bind(signature: Signature, args: Sequence[Any], named: Mapping[str, Any]) ->
     return [values[name] for name in names]
 
 
-def as_array(kernel: str, port: Port, value: Any) -> Array:
+def as_array(kernel: str, port: Port, value: Any, real: str = "double") -> Array:
     """Any numbers as a C-contiguous, aligned array of the port's type, of any shape.
 
     Raises:
         ShapeError: not numbers, ragged, or complex where the port is real.
+        InputError: a number that is beyond the floats, where they are asked for.
     """
-    wanted = dtype_of(port)
+    wanted = dtype_of(port, real)
     if type(value) is np.ndarray and value.dtype is wanted and value.flags.c_contiguous and value.flags.aligned:
         return value
     try:
@@ -61,16 +65,22 @@ def as_array(kernel: str, port: Port, value: Any) -> Array:
         raise ShapeError(f"{kernel}: {port.name} is real, {describe(port)}; complex numbers were given")
     if array.dtype.kind not in "biufc":
         raise ShapeError(f"{kernel}: {port.name} takes numbers, {describe(port)}; given {type(value).__name__}")
-    return np.require(array, dtype=wanted, requirements=["C", "A"]).reshape(array.shape)
+    try:
+        with np.errstate(over="raise"):
+            return np.require(array, dtype=wanted, requirements=["C", "A"]).reshape(array.shape)
+    except FloatingPointError as error:
+        raise InputError(
+            f"{kernel}: {port.name} has a number beyond 3.4e38, which no float is; compute in doubles"
+        ) from error
 
 
-def checked(kernel: str, port: Port, value: Any) -> Array:
+def checked(kernel: str, port: Port, value: Any, real: str = "double") -> Array:
     """As `as_array`, of exactly the port's shape.
 
     Raises:
         ShapeError: any other shape.
     """
-    array = as_array(kernel, port, value)
+    array = as_array(kernel, port, value, real)
     if array.shape != port.shape:
         raise ShapeError(f"{kernel}: {port.name} has shape {port.shape}, given {array.shape}")
     return array
@@ -86,7 +96,7 @@ def sequences(
     """
     arrays, strides, length, first = [], [], None, ""
     for port, value in zip(ports, values, strict=True):
-        array = as_array(signature.name, port, value)
+        array = as_array(signature.name, port, value, signature.real)
         if array.shape == port.shape:
             strides.append(0)
         elif array.shape[1:] == port.shape and array.ndim:
@@ -114,12 +124,12 @@ def outputs_for(signature: Signature, out: Any, lead: tuple[int, ...]) -> list[A
     """
     ports = signature.outputs
     if out is None:
-        return [empty(lead + port.shape, dtype_of(port)) for port in ports]
+        return [empty(lead + port.shape, dtype_of(port, signature.real)) for port in ports]
     given = list(out) if isinstance(out, (tuple, list)) else [out]
     if len(given) != len(ports):
         raise ShapeError(f"{signature.name} has {len(ports)} outputs, out= has {len(given)}")
     for port, array in zip(ports, given, strict=True):
-        shape, dtype = lead + port.shape, dtype_of(port)
+        shape, dtype = lead + port.shape, dtype_of(port, signature.real)
         if not isinstance(array, np.ndarray) or array.shape != shape or array.dtype != dtype or not array.flags.carray:
             raise ShapeError(
                 f"{signature.name}: out= for {port.name} must be a writable C-contiguous array, {dtype} {shape}; "

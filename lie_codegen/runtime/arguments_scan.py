@@ -28,7 +28,7 @@ def loops(signature: Signature, values: Sequence[Any], steps: int) -> tuple[list
     count: int | None = None
     first, has_axis = "", False
     for number, (port, value) in enumerate(zip(signature.inputs, values, strict=True)):
-        array = as_array(signature.name, port, value)
+        array = as_array(signature.name, port, value, signature.real)
         lead = array.shape[: array.ndim - len(port.shape)]
         fits = array.shape[len(lead) :] == port.shape and len(lead) <= (1 if number == 0 else 2)
         if not fits or (len(lead) == 2 and lead[1] not in (1, steps)):

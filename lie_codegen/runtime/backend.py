@@ -6,7 +6,8 @@ Arrays are C-contiguous, aligned, of double entries (complex ones as pairs); sha
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
@@ -46,6 +47,17 @@ class Backend(Protocol):
     ) -> None:
         """`count` such loops; strides in doubles from one trajectory to the next and from one step to the next."""
 
+    def reduce(
+        self,
+        count: int,
+        steps: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        how: Sequence[int],
+        outputs: Sequence[np.ndarray[Any, Any] | None],
+    ) -> None:
+        """`count` such loops of which the last states are kept, and each output with how[k] reduced into outputs[k]."""
+
     def loop_address(self, *, many: bool) -> int:
         """Where the C of `scan` (`scan_batch`) is; 0 if there is none."""
 
@@ -57,8 +69,8 @@ class _Workspace:
     """Buffers of one call, with their addresses; asking numpy for an address costs more than a kernel."""
 
     def __init__(self, signature: Signature) -> None:
-        self.inputs = [np.empty(port.shape, dtype_of(port)) for port in signature.inputs]
-        self.outputs = [np.empty(port.shape, dtype_of(port)) for port in signature.outputs]
+        self.inputs = [np.empty(port.shape, dtype_of(port, signature.real)) for port in signature.inputs]
+        self.outputs = [np.empty(port.shape, dtype_of(port, signature.real)) for port in signature.outputs]
         self.input_pointers = _pointers(self.inputs)
         self.output_pointers = _pointers(self.outputs)
 
@@ -81,6 +93,12 @@ class CtypesBackend:
     def _batch(self) -> Any:
         void, size = ctypes.c_void_p, ctypes.c_ssize_t
         return _function(self._open_lanes(), f"{self._signature.symbol}_batch", size, void, void, void)
+
+    @cached_property
+    def _reduce(self) -> Any:
+        void, size = ctypes.c_void_p, ctypes.c_ssize_t
+        symbol = f"{self._signature.symbol}_reduce"
+        return _function(self._open_lanes(), symbol, size, size, void, void, void, void, void)
 
     @cached_property
     def _scan_batch(self) -> Any:
@@ -123,6 +141,19 @@ class CtypesBackend:
             raise CacheError("the library has no loop for this kernel")
         lanes, moves = (_strides([pair[side] for pair in strides]) for side in (0, 1))
         self._scan_batch(count, steps, every, _pointers(inputs), lanes, moves, trajectories.ctypes.data)
+
+    def reduce(
+        self,
+        count: int,
+        steps: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        how: Sequence[int],
+        outputs: Sequence[np.ndarray[Any, Any] | None],
+    ) -> None:
+        lanes, moves = (_strides([pair[side] for pair in strides]) for side in (0, 1))
+        kept = (ctypes.c_void_p * len(outputs))(*[None if each is None else each.ctypes.data for each in outputs])
+        self._reduce(count, steps, _pointers(inputs), lanes, moves, (ctypes.c_int * len(how))(*how), kept)
 
     def loop_address(self, *, many: bool) -> int:
         if self._scan is None:
@@ -188,11 +219,106 @@ class InterpretedBackend:
             mine[0] = mine[0][: self._function.numel_in(0)]
             self.scan(steps, every, mine, [step for _, step in strides], trajectories[j])
 
+    def reduce(
+        self,
+        count: int,
+        steps: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        how: Sequence[int],
+        outputs: Sequence[np.ndarray[Any, Any] | None],
+    ) -> None:
+        rows = [_flat(array) for array in inputs]
+        sizes = [self._function.numel_in(i) for i in range(len(inputs))]
+        states, *kept = [None if each is None else _flat(each).reshape(count, -1) for each in outputs]
+        for j in range(count):
+            state: Any = rows[0][j * strides[0][0] :][: sizes[0]]
+            for k in range(steps):
+                starts = [j * lane + k * step for lane, step in strides[1:]]
+                rest = [row[at : at + size] for row, at, size in zip(rows[1:], starts, sizes[1:], strict=True)]
+                found = [np.array(each.nonzeros()) for each in self._function.call([state, *rest])]
+                state = found[0]
+                for way, target, value in zip(how[1:], kept, found[1:], strict=True):
+                    if target is not None:
+                        target[j] = _REDUCED[way](target[j], value)
+            if states is not None:
+                states[j] = state
+
     def loop_address(self, *, many: bool) -> int:
         return 0
 
     def address(self, *, many: bool) -> int:
         return 0
+
+
+class Rounded:
+    """A backend that computes in doubles, for arrays of floats."""
+
+    def __init__(self, backend: Backend) -> None:
+        self._backend = backend
+
+    def call(self, inputs: Arrays, outputs: Arrays) -> None:
+        with _doubles(outputs) as wide:
+            self._backend.call([_widened(array) for array in inputs], wide)
+
+    def batch(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
+        with _doubles(outputs) as wide:
+            self._backend.batch(count, [_widened(array) for array in inputs], strides, wide)
+
+    def scan(
+        self, count: int, every: int, inputs: Arrays, strides: Sequence[int], trajectory: np.ndarray[Any, Any]
+    ) -> None:
+        with _doubles([trajectory]) as (wide,):
+            self._backend.scan(count, every, [_widened(array) for array in inputs], strides, wide)
+
+    def scan_batch(
+        self,
+        count: int,
+        steps: int,
+        every: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        trajectories: np.ndarray[Any, Any],
+    ) -> None:
+        with _doubles([trajectories]) as (wide,):
+            self._backend.scan_batch(count, steps, every, [_widened(array) for array in inputs], strides, wide)
+
+    def reduce(
+        self,
+        count: int,
+        steps: int,
+        inputs: Arrays,
+        strides: Sequence[tuple[int, int]],
+        how: Sequence[int],
+        outputs: Sequence[np.ndarray[Any, Any] | None],
+    ) -> None:
+        with _doubles([each for each in outputs if each is not None]) as wide:
+            rest = iter(wide)
+            given = [None if each is None else next(rest) for each in outputs]
+            self._backend.reduce(count, steps, [_widened(array) for array in inputs], strides, how, given)
+
+    def loop_address(self, *, many: bool) -> int:
+        return 0
+
+    def address(self, *, many: bool) -> int:
+        return 0
+
+
+def _widened(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    return array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
+
+
+@contextmanager
+def _doubles(outputs: Arrays) -> Iterator[list[np.ndarray[Any, Any]]]:
+    """Arrays of doubles in the place of the outputs, which get them rounded."""
+    wide = [_widened(array) for array in outputs]
+    yield wide
+    for array, values in zip(outputs, wide, strict=True):
+        array[...] = values
+
+
+#: How the numbers of `scans.REDUCTIONS` reduce; a NaN stays.
+_REDUCED: dict[int, Callable[[Any, Any], Any]] = {1: np.add, 2: np.maximum, 3: np.minimum, 4: lambda _, new: new}
 
 
 def load_library(path: Path) -> ctypes.CDLL:

@@ -37,6 +37,7 @@ def build_kernels(
     namespace: str | None = None,
     definition: str | None = None,
     options: Mapping[str, Any] | None = None,
+    real: str = "double",
 ) -> Library:
     """The kernels as a library of callables.
 
@@ -46,6 +47,7 @@ def build_kernels(
         definition: text that, with the source of this package, determines the kernels; None if they
             come from elsewhere.
         options: plain data that `make_kernels` depends on beside the definition.
+        real: "double", or "float": what the library computes in, takes and gives.
 
     Raises:
         CodegenError: a kernel cannot become C.
@@ -55,14 +57,16 @@ def build_kernels(
     compilers = find_compilers()
     if not compilers:
         warn_no_compiler()
-        return interpreted(make_kernels(), namespace=namespace)
+        return interpreted(make_kernels(), namespace=namespace, real=real)
 
     def make_sources() -> LibrarySources:
         from lie_codegen.codegen import package
 
         kernels = tuple(make_kernels())
-        return package.render_library(_namespace(namespace, kernels), kernels)
+        return package.render_library(_namespace(namespace, kernels), kernels, real)
 
+    if real != "double":
+        options = {**(options or {}), "real": real}
     return build_sources(make_sources, compilers, namespace=namespace, definition=definition, options=options)
 
 
@@ -94,19 +98,20 @@ def build_sources(
         return _compile(folder, sources, compilers, requests)
 
 
-def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None) -> Library:
-    """The kernels run by CasADi's interpreter: no compiler, the same results."""
+def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None, real: str = "double") -> Library:
+    """The kernels run by CasADi's interpreter, in doubles: no compiler, the same results (rounded, for floats)."""
     from lie_codegen.codegen.package import render_library
     from lie_codegen.kernel.casadi_arithmetic import function_of
-    from lie_codegen.runtime.backend import InterpretedBackend
+    from lie_codegen.runtime.backend import InterpretedBackend, Rounded
     from lie_codegen.runtime.call import Compiled
 
     namespace = _namespace(namespace, kernels)
-    signatures = render_library(namespace, kernels).signatures  # refuses what C would refuse
+    signatures = render_library(namespace, kernels, real).signatures  # refuses what C would refuse
     check_names(signatures)
+    backends = [InterpretedBackend(function_of(kernel)) for kernel in kernels]
     functions: list[Compiled[Any]] = [
-        Compiled(signature, InterpretedBackend(function_of(kernel)), compiled=False)
-        for signature, kernel in zip(signatures, kernels, strict=True)
+        Compiled(signature, backend if real == "double" else Rounded(backend), compiled=False)
+        for signature, backend in zip(signatures, backends, strict=True)
     ]
     return Library(namespace, functions, None)
 

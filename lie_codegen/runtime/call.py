@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.codegen.signature import Signature, is_step, python_field
+from lie_codegen.codegen.signature import Signature, python_field
 from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.plain_data import Definition, makes_records
-from lie_codegen.runtime.arguments import bind, checked, describe, dtype_of, outputs_for, sequences, unshared
-from lie_codegen.runtime.arguments_scan import loops
+from lie_codegen.runtime.arguments import DTYPES, bind, checked, describe, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.patience import progress
-from lie_codegen.runtime.threads import CALLS, in_parts, step_pieces, stopped
+from lie_codegen.runtime.scans import check_loop, scan, scan_batch, scan_reduced
+from lie_codegen.runtime.threads import CALLS, in_parts
 
 if TYPE_CHECKING:
     import inspect
@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from lie_codegen.runtime.varying import Varying
 
 
-#: What compiles the entries that vary: it stands on what builds libraries, and so above this file; loaded when they are first asked for.
-VARYING = "lie_codegen.runtime.varying_build"
+#: What compiles the entries that vary, and what compiles in floats: they stand on what builds libraries, and so above this file; loaded
+#: when first asked for.
+VARYING, SINGLE = "lie_codegen.runtime.varying_build", "lie_codegen.runtime.single_build"
 #: What a call gives: an array, a number, or a named tuple.
 Result = TypeVar("Result")
 
@@ -94,13 +95,22 @@ class Compiled(Generic[Result]):
             ShapeError: naming the argument, what was expected and what was given.
         """
         values = bind(self.signature, args, named) if named or len(args) != len(self.inputs) else args
-        arrays = [checked(self.name, port, value) for port, value in zip(self.inputs, values, strict=True)]
+        real = self.signature.real
+        arrays = [checked(self.name, port, value, real) for port, value in zip(self.inputs, values, strict=True)]
         outputs = outputs_for(self.signature, out, ())
         self.backend.call(arrays, outputs)
         result: Result = self._wrap(outputs, out, scalars=True)
         return result
 
-    def batch(self, *args: Any, out: Any = None, threads: int = 1, layout: str = "whole", **named: Any) -> Any:
+    def batch(
+        self,
+        *args: Any,
+        out: Any = None,
+        threads: int = 1,
+        layout: str = "whole",
+        real: str = "double",
+        **named: Any,
+    ) -> Any:
         """Evaluate N times: an input has a leading axis of length N, or is the same for all.
 
         Args:
@@ -108,6 +118,8 @@ class Compiled(Generic[Result]):
             threads: over which the samples are shared out.
             layout: "varying" for (N, m): the entries that are not the same for all inputs alone, in C order, as the twelve of a
                 rigid motion; less is written, which is what large batches wait for. `varying` and `whole` say where they belong.
+            real: "float" for screening: computes, takes and gives float32 (complex64), on twice as many lanes; errors of some 1e-7,
+                with the series and thresholds of packages in floats.
 
         Returns:
             (N, *shape), or a named tuple of such arrays. Each sample as a call, to the accuracy of the lane mathematics:
@@ -116,12 +128,16 @@ class Compiled(Generic[Result]):
 
         Raises:
             ShapeError: as for a call; or no input has the leading axis, or two lengths differ.
-            InputError: another layout.
+            InputError: another layout or real; a number that no float is.
+            CodegenError: a constant of the kernel is no float.
         """
+        self._check_real("batch", real)
         if isinstance(layout, str) and layout == "varying":
-            return self._varying.function.batch(*args, out=out, threads=threads, **named)
+            return self._varying.function.batch(*args, out=out, threads=threads, real=real, **named)
         if not isinstance(layout, str) or layout != "whole":
             raise InputError(f'{self.name}.batch: layout is "whole" or "varying", given {shown(layout)}')
+        if real != self.signature.real:
+            return self._single.batch(*args, out=out, threads=threads, real=real, **named)
         values = bind(self.signature, args, named)
         arrays, strides, count = sequences(self.signature, values, "samples", self.inputs)
         if count is None:
@@ -137,6 +153,16 @@ class Compiled(Generic[Result]):
         with progress("batch") if count > CALLS else nullcontext():
             in_parts(some, count, threads)
         return self._wrap(outputs, out, scalars=False)
+
+    @cached_property
+    def _single(self) -> Compiled[Any]:
+        made: Compiled[Any] = import_module(SINGLE).single_of(self.kernel)
+        return made
+
+    def _check_real(self, form: str, real: str) -> None:
+        known = [self.signature.real] if self.signature.real != "double" else list(DTYPES)
+        if not isinstance(real, str) or real not in known:
+            raise InputError(f"{self.name}.{form}: real is one of {', '.join(known)}, given {shown(real)}")
 
     @cached_property
     def _varying(self) -> Varying:
@@ -176,36 +202,19 @@ class Compiled(Generic[Result]):
             InputError: the kernel is no step, or n is no multiple of `every`.
             ShapeError: as for a batch.
         """
-        self._check_loop("scan", n, every)
-        start, *rest = bind(self.signature, args, named)
-        state = checked(self.name, self.inputs[0], start)
-        arrays, strides, count = sequences(self.signature, rest, "steps", self.inputs[1:])
-        if count is not None and count != n:
-            raise ShapeError(f"{self.name}.scan: inputs have {count} steps, n = {n}")
-        port = self.outputs[0]
-        only = Signature(self.name, self.signature.symbol, self.inputs, (port,))
-        (trajectory,) = outputs_for(only, out, (int(n) // int(every) + 1,))
-        arrays = [state, *arrays]
-        if out is not None:
-            arrays = unshared(arrays, [trajectory])
-        if int(n) <= CALLS:
-            self.backend.scan(int(n), int(every), arrays, [0, *strides], trajectory)
-            return trajectory
-        trajectory[0] = state
-        for first, steps, kept in step_pieces(int(n), int(every), CALLS):
-            made = np.empty((steps // kept + 1, *trajectory.shape[1:]), trajectory.dtype)
-            mine = [
-                state,
-                *(a[first : first + steps] if stride else a for a, stride in zip(arrays[1:], strides, strict=True)),
-            ]
-            self.backend.scan(steps, kept, mine, [0, *strides], made)
-            state = made[-1].copy()
-            if (first + steps) % int(every) == 0:
-                place = (first + steps) // int(every)
-                trajectory[place - len(made) + 2 : place + 1] = made[1:]
-        return trajectory
+        return scan(self, args, named, n, every, out)
 
-    def scan_batch(self, *args: Any, n: int, every: int = 1, out: Any = None, threads: int = 1, **named: Any) -> Array:
+    def scan_batch(
+        self,
+        *args: Any,
+        n: int,
+        every: int = 1,
+        out: Any = None,
+        threads: int = 1,
+        reduce: Mapping[str, str] | None = None,
+        real: str = "double",
+        **named: Any,
+    ) -> Any:
         """T such loops at once, on lanes: the loop of `scan` from every start.
 
         Args:
@@ -214,47 +223,30 @@ class Compiled(Generic[Result]):
                 be one `shape` if another input has T.
             n, every, out: as for `scan`.
             threads: over which the trajectories are shared out.
+            reduce: {output: "sum" | "max" | "min" | "last"} of the outputs behind the state, as a step's cost or error: no
+                trajectory is stored, neither states nor these. {} for the last states alone.
+            real: "float" for screening, as for a batch.
             **named: inputs by name.
 
         Returns:
-            (T, n // every + 1, *shape); as `scan` from each start to the accuracy of a batch.
+            (T, n // every + 1, *shape); as `scan` from each start to the accuracy of a batch. With `reduce` a named tuple: the
+            last states (T, *shape), then (T, *its shape) of each output named, over all n steps (a NaN stays; of no step: 0,
+            -inf, inf, NaN).
 
         Raises:
-            InputError, ShapeError: as for `scan`.
+            InputError: as for `scan`; `reduce` names no output behind the state, or no such reduction.
+            ShapeError: as for `scan`.
         """
-        self._check_loop("scan_batch", n, every)
-        values = bind(self.signature, args, named)
-        arrays, strides, count = loops(self.signature, values, int(n))
-        port = self.outputs[0]
-        only = Signature(self.name, self.signature.symbol, self.inputs, (port,))
-        (trajectories,) = outputs_for(only, out, (count, int(n) // int(every) + 1))
-        if out is not None:
-            arrays = unshared(arrays, [trajectories])
-
-        def some(start: int, stop: int) -> None:
-            mine = [array if lane == 0 else array[start:stop] for array, (lane, _) in zip(arrays, strides, strict=True)]
-            if int(n) * (stop - start) <= 2 * CALLS:
-                self.backend.scan_batch(stop - start, int(n), int(every), mine, strides, trajectories[start:stop])
-                return
-            trajectories[start:stop, 0] = mine[0]
-            for first, steps, kept in step_pieces(int(n), int(every), max(1, CALLS // (stop - start))):
-                made = np.empty((stop - start, steps // kept + 1, *port.shape), trajectories.dtype)
-                # each trajectory has its entries of all steps in a row: their place moves on, their strides stay
-                now = [
-                    a if k == 0 or not step else a.reshape(-1)[first * step // _doubles(a) :]
-                    for k, (a, (_, step)) in enumerate(zip(mine, strides, strict=True))
-                ]
-                self.backend.scan_batch(stop - start, steps, kept, now, strides, made)
-                mine[0] = np.ascontiguousarray(made[:, -1])
-                if stopped():
-                    return
-                if (first + steps) % int(every) == 0:
-                    place = (first + steps) // int(every)
-                    trajectories[start:stop, place - made.shape[1] + 2 : place + 1] = made[:, 1:]
-
-        with progress("scan_batch") if count * int(n) > CALLS else nullcontext():
-            in_parts(some, count, threads, int(n))
-        return trajectories
+        self._check_real("scan_batch", real)
+        if real != self.signature.real:
+            return self._single.scan_batch(
+                *args, n=n, every=every, out=out, threads=threads, reduce=reduce, real=real, **named
+            )
+        if reduce is None:
+            return scan_batch(self, args, named, n, every, out, threads)
+        if out is not None or every != 1:
+            raise InputError(f"{self.name}.scan_batch: reduce= stores no trajectory; leave every= and out= out")
+        return scan_reduced(self, args, named, n, reduce, threads)
 
     def drive(
         self,
@@ -293,7 +285,7 @@ class Compiled(Generic[Result]):
         from lie_codegen.runtime.drive import STAGES, Spans, driven_loop
         from lie_codegen.runtime.formula_input import formula_input
 
-        self._check_loop("drive", n, every)
+        check_loop(self, "drive", n, every)
         for name, value in (("h", h), ("t0", t0)):
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
                 raise InputError(f"{self.name}.drive: {name} is a finite number, given {value!r}")
@@ -305,15 +297,6 @@ class Compiled(Generic[Result]):
             )
         spans = Spans(int(n) // int(every), int(every), None, float(t0), float(h))
         return driven_loop(self, start, formula, spans, at=at or STAGES, others=named, threads=threads)[0]
-
-    def _check_loop(self, form: str, n: Any, every: Any) -> None:
-        if not is_step(self.inputs, self.outputs):
-            raise InputError(f"{self.name}.{form}: the first output is not of the shape of the first input")
-        for name, value, least in (("n", n, 0), ("every", every, 1)):
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-                raise InputError(f"{self.name}.{form}: {name} is an integer of at least {least}, given {value!r}")
-        if n % every:
-            raise InputError(f"{self.name}.{form}: n = {n} is no multiple of every = {every}")
 
     def _wrap(self, outputs: list[Array], out: Any, *, scalars: bool) -> Any:
         if out is not None:
@@ -380,11 +363,6 @@ class Compiled(Generic[Result]):
         return f"<{how} kernel {_prototype(self.signature)}>"
 
 
-def _doubles(array: Array) -> int:
-    """Of one entry."""
-    return 2 if array.dtype.kind == "c" else 1
-
-
 @makes_records
 def kernel_of_library(library: Any, name: str) -> Any:
     """A compiled kernel as pickles and files name it."""
@@ -397,7 +375,7 @@ def documentation(signature: Signature) -> str:
     for port in signature.inputs + signature.outputs:
         units = f" [{port.units}]" if port.units else ""
         about = f": {port.description}" if port.description else ""
-        lines.append(f"{port.name}: {describe(port)}, {dtype_of(port)}{units}{about}")
+        lines.append(f"{port.name}: {describe(port)}, {dtype_of(port, signature.real)}{units}{about}")
     if signature.source:
         lines += ["", f"Source: {signature.source}"]
     return "\n".join(lines)

@@ -14,14 +14,17 @@ _FROM = 32_768  # bytes
 
 
 def empty(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
-    """As numpy.empty of float64 or complex128; 64-byte aligned where it is large, and not at the price of fresh pages."""
+    """As numpy.empty of float64, complex128, float32 or complex64; 64-byte aligned where it is large, and not at the price of fresh pages."""
     if prod(shape) * dtype.itemsize < _FROM:
         return np.empty(shape, dtype)
     module = extension()
     if module is None:
         return np.empty(shape, dtype)
-    array: Array = module.empty(shape, dtype.kind == "c")
-    return array
+    if dtype in (np.dtype(np.float64), np.dtype(np.complex128)):
+        array: Array = module.empty(shape, dtype.kind == "c")
+        return array
+    doubles: Array = module.empty((-(-prod(shape) * dtype.itemsize // 8),), False)
+    return doubles.view(dtype)[: prod(shape)].reshape(shape)
 
 
 def idle_bytes() -> int:

@@ -17,12 +17,12 @@ _MOST_PORTS = 32
 
 
 def quick(compiled: Compiled[Any], library: ctypes.CDLL, lanes: LaneLibrary, signature: Signature) -> Compiled[Any]:
-    """`compiled` behind a fast path for exact arguments; itself where there is no extension.
+    """`compiled` behind a fast path for exact arguments; itself where there is no extension, or it computes in floats.
 
     What the fast path does not take, and every attribute but `batch`, is that of `compiled`.
     """
     module = extension()
-    if module is None or len(signature.inputs + signature.outputs) > _MOST_PORTS:
+    if module is None or signature.real != "double" or len(signature.inputs + signature.outputs) > _MOST_PORTS:
         return compiled
     inputs, outputs = _plain(signature.inputs), _plain(signature.outputs)
 

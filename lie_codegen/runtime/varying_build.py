@@ -19,6 +19,8 @@ def varying_of(kernel: Kernel) -> Varying:
     """
     made = varying(kernel)
     library = build_kernels(lambda: [made], namespace=made.namespace, definition=defined_together([made]))
+    library.compiled_from(lambda name: made)
+    library[made.name].belongs_to(library)
     places, values = varying_places(kernel)
     index = tuple(
         np.unravel_index(np.array(kept), p.shape) if p.shape else ()

@@ -16,7 +16,7 @@ import pytest
 
 from lie_codegen.codegen.lane_coefficients import POLYNOMIALS
 from lie_codegen.codegen.lane_forms import LANE_FORMS
-from lie_codegen.codegen.lanes import lanes_header
+from lie_codegen.codegen.lane_headers import lanes_header
 from lie_codegen.runtime.compiler import FLAGS, find_compilers
 
 HERE = Path(__file__).resolve().parent
@@ -185,5 +185,5 @@ def test_the_polynomials_are_as_good_as_they_say() -> None:
 
 @pytest.mark.slow
 def test_the_coefficients_are_those_of_the_fit() -> None:
-    script = HERE / "tools" / "fit_lane_polynomials.py"
+    script = HERE.parent / "tools" / "fit_lane_polynomials.py"
     subprocess.run([sys.executable, str(script), "--check"], check=True)

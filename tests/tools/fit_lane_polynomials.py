@@ -11,11 +11,12 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import mpmath as mp
+import numpy as np
 
 OUTPUT = Path(__file__).resolve().parents[2] / "lie_codegen" / "codegen" / "lane_coefficients.py"
 Function = Callable[[Any], Any]
@@ -23,7 +24,7 @@ Function = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Fit:
-    """p(z) ~ value(z) on [low, high] with `count` coefficients; weight(z) times the error counts."""
+    """p(z) ~ value(z) on [low, high] with `count` coefficients; weight(z) times the error counts. `real` rounds a coefficient."""
 
     name: str
     about: str
@@ -32,6 +33,12 @@ class Fit:
     low: Any
     high: Any
     count: int
+    real: Function = float
+
+
+def single(value: Any) -> float:
+    """The float nearest, in the digits that tell it."""
+    return float(str(np.float32(float(value))))
 
 
 def series(terms: Sequence[Any]) -> Function:
@@ -101,6 +108,11 @@ def fits() -> list[Fit]:
     ]
 
 
+def float_fits() -> list[Fit]:
+    """Sine and cosine for floats: their own products are rounded at 2^-24."""
+    return [replace(fit, count=3, real=single) for fit in fits() if fit.name in ("SIN", "COS")]
+
+
 def remez(value: Function, weight: Function, low: Any, high: Any, count: int) -> list[Any]:
     """The coefficients, lowest first, that minimise max |weight (value - p)|."""
     middle, radius = (mp.mpf(low) + high) / 2, (mp.mpf(high) - low) / 2
@@ -142,9 +154,9 @@ def rounded(fit: Fit) -> tuple[list[float], float]:
     for count in range(fit.count, 0, -1):
         best = remez(value, weight, fit.low, fit.high, count)
         if fit.low != 0:
-            done = [float(each) for each in best]
+            done = [fit.real(each) for each in best]
             break
-        first = float(best[0])
+        first = fit.real(best[0])
         done.append(first)
         value = shifted(value, first)
         weight = times(weight)
@@ -180,23 +192,31 @@ def text() -> str:
         "from __future__ import annotations",
         "",
         "#: name -> (what it approximates, coefficients, log2 of the largest relative error).",
-        "POLYNOMIALS: dict[str, tuple[str, tuple[float, ...], float]] = {",
-    ]
-    for fit in fits():
-        coefficients, error = rounded(fit)
-        lines += [f'    "{fit.name}": (', f'        "{fit.about}",', "        ("]
-        lines += [f"            {coefficient!r}," for coefficient in coefficients]
-        lines += ["        ),", f"        {error:.1f},", "    ),"]
-    lines += [
-        "}",
+        *table("POLYNOMIALS", fits()),
+        "",
+        "#: For lanes of floats.",
+        *table("FLOAT_POLYNOMIALS", float_fits()),
         "",
         "#: pi/2 and log 2 as sums: full doubles where products are fused, else parts whose multiples are exact.",
         split("HALF_PI", mp.pi / 2, (53, 53, 53)),
         split("HALF_PI_PARTS", mp.pi / 2, (33, 33, 33, 53)),
         split("LOG2_PARTS", mp.log(2), (32, 53)),
+        "#: pi/2 as a sum of floats.",
+        split("HALF_PI_FLOATS", mp.pi / 2, (24, 24, 24)),
         "",
     ]
     return "\n".join(lines)
+
+
+def table(name: str, wanted: Sequence[Fit]) -> list[str]:
+    """The lines of a dictionary."""
+    lines = [f"{name}: dict[str, tuple[str, tuple[float, ...], float]] = {{"]
+    for fit in wanted:
+        coefficients, error = rounded(fit)
+        lines += [f'    "{fit.name}": (', f'        "{fit.about}",', "        ("]
+        lines += [f"            {coefficient!r}," for coefficient in coefficients]
+        lines += ["        ),", f"        {error:.1f},", "    ),"]
+    return [*lines, "}"]
 
 
 def main() -> int:

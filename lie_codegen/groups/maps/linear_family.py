@@ -1,17 +1,23 @@
-"""A(x) = sum_i x_i A_i at one x: its columns, its square and its quadratic forms, with equal entries and products computed once."""
+"""A(x) = sum_i x_i A_i at one x: its columns, squares and quadratic forms, with products of coordinates shared."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 from lie_codegen.exact.quadratic_form import QuadraticForm
+from lie_codegen.groups.maps.exact_krylov import ExactKrylov
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.linear import number
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.on_demand import sympy as sp
 
 Sparse = dict[int, Scalar]
+
+
+def _fraction(value: Any) -> Fraction:
+    return Fraction(int(value.p), int(value.q))
 
 
 class LinearFamily:
@@ -29,6 +35,7 @@ class LinearFamily:
                         self.columns[c].setdefault(r, {})[i] = value
         self._polynomials: dict[Any, tuple[Any, Scalar]] = {}
         self._monomials: dict[tuple[int, ...], Scalar] = {}
+        self._exact: dict[tuple[int, QuadraticForm], ExactKrylov | None] = {}
 
     def form(self, form: QuadraticForm) -> Scalar:
         """q(x)."""
@@ -66,6 +73,36 @@ class LinearFamily:
             if left:
                 result[r] = self._polynomial(left)
         return result
+
+    def factored(self, form: QuadraticForm, j: int, power: int, s: int) -> dict[int, tuple[int, Scalar]] | None:
+        """A^power (A^2 + q)^s e_j from its exact polynomials, where these are short products."""
+        if (j, form) not in self._exact:
+            self._exact[j, form] = self._exact_krylov(form, j)
+        exact = self._exact[j, form]
+        entries = None if exact is None else exact.factors(power, s)
+        if entries is None:
+            return None
+        return {row: self._product_of(*entry) for row, entry in entries.items()}
+
+    def _exact_krylov(self, form: QuadraticForm, j: int) -> ExactKrylov | None:
+        numbers = [a for column in self.columns for entry in column.values() for a in entry.values()]
+        if not all(a.is_Rational for a in (*numbers, *(value for _, value in form.coefficients))):
+            return None
+        columns = [
+            {r: {i: _fraction(a) for i, a in entry.items()} for r, entry in column.items()} for column in self.columns
+        ]
+        zero = {i for i, value in enumerate(self.x) if is_zero(value)}
+        q: dict[tuple[int, ...], Fraction] = {
+            pair: _fraction(a) for pair, a in form.coefficients if not zero & set(pair)
+        }
+        return ExactKrylov(columns, q, j)
+
+    def _product_of(self, scale: Fraction, factors: Sequence[Any]) -> tuple[int, Scalar]:
+        sign, value = (-1 if scale < 0 else 1), number(self.ops, sp.Rational(abs(scale).numerator, scale.denominator))
+        for factor in factors:
+            turned, entry = self._polynomial({key: sp.Rational(a.numerator, a.denominator) for key, a in factor})
+            sign, value = sign * turned, product(value, entry)
+        return sign, value
 
     def _signed(self, pair: tuple[int, Scalar]) -> Scalar:
         return product(pair[1], pair[0])

@@ -116,6 +116,7 @@ class _Krylov:
     def __init__(self, family: LinearFamily, pattern: ColumnPattern, start: int | Sparse) -> None:
         self.family = family
         self.start = start
+        self.pattern = pattern
         self.supports = dict(pattern.supports)
         self._done: dict[tuple[int, int], dict[int, tuple[int, Scalar]]] = {}
 
@@ -128,6 +129,11 @@ class _Krylov:
 
     def _compute(self, power: int, s: int, z: Scalar) -> dict[int, tuple[int, Scalar]]:
         if s:
+            form = self.pattern.form
+            if isinstance(self.start, int) and form is not None:
+                exact = self.family.factored(form, self.start, power, s)
+                if exact is not None:
+                    return exact
             # (A^2 + q) w = A^2 w + q w, each part known from one power of (A^2 + q) less. Where the sum vanishes for every x, by the exact
             # pattern, it is not formed: in floating point it would be a rounding error.
             higher = self._plain(self.vector(power + 2, s - 1, z))

@@ -18,7 +18,7 @@ from math import factorial
 from lie_codegen.exact.even_spectrum import EvenSpectrum, newton_coefficients
 from lie_codegen.exact.invariant_form import Relation
 from lie_codegen.groups.maps.quotient_ring import Element, QuotientRing, matrix_value, power_sums, related_product
-from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar, terms
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.cotangent import four_pi_squared, taylor
 from lie_codegen.kernel.linear import Matrix, identity, matadd
@@ -27,12 +27,13 @@ from lie_codegen.kernel.structural_zeros import add, product
 #: Eigenvalues up to 10 are brought below 10/16 = 0.63, where the next term of every series is below a rounding error:
 #: 0.63^16/16! = 3e-17 and 0.63^22/22! = 3e-26. More halvings would cost bits in the doublings, fewer would cost terms.
 _HALVINGS = 4
-_EVEN_TERMS = 11
-_EXP_TERMS = 16
+#: In floats, of which smaller terms are no part (and would be subnormal, which is slow): 0.63^12/12! = 8e-12, 0.63^11/11! = 2e-10.
+_EVEN_TERMS, _EVEN_FLOAT_TERMS = 11, 6
+_EXP_TERMS, _EXP_FLOAT_TERMS = 16, 11
 #: (t/2) coth(t/2) has poles at t = 2 pi i k. With the nearest three taken out the rest is analytic up to |t| = 8 pi, and its series
-#: in t^2 falls by (10/(8 pi))^2 = 0.16 a term: 0.16^18 = 5e-15.
+#: in t^2 falls by (10/(8 pi))^2 = 0.16 a term: 0.16^18 = 5e-15; in floats 0.16^10 = 1e-8.
 _POLES = 3
-_REMAINDER_TERMS = 18
+_REMAINDER_TERMS, _REMAINDER_FLOAT_TERMS = 18, 10
 
 
 def exponential(
@@ -57,7 +58,8 @@ def exponential(
         return matrix_value(ops, [Complex(c, s) for c, s in zip(cosine, sine, strict=True)], powers)
     ring, powers = _plain_ring(ops, A, traceless=traceless)
     scale = Fraction(1, 2**_HALVINGS)
-    value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, _EXP_TERMS)])
+    count = terms(ops, _EXP_TERMS, _EXP_FLOAT_TERMS)
+    value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, count)])
     for _ in range(_HALVINGS):
         value = ring.plus(ring.times(value, value), value, 2)
     value[0] = add(value[0], 1)
@@ -78,8 +80,9 @@ def plain_jacobian_of_exp(ops: Arithmetic, ad: Matrix, *, traceless: bool, sign:
     """(e^a - 1)/a at a = sign ad, for any spectrum: phi(2 t) = phi(t) (e^t + 1) / 2."""
     ring, powers = _plain_ring(ops, ad, traceless=traceless)
     scale = Fraction(sign, 2**_HALVINGS)
-    value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, _EXP_TERMS)])
-    phi = ring.series([scale**j / factorial(j + 1) for j in range(_EXP_TERMS)])
+    count = terms(ops, _EXP_TERMS, _EXP_FLOAT_TERMS)
+    value = ring.series([Fraction(0)] + [scale**j / factorial(j) for j in range(1, count)])
+    phi = ring.series([scale**j / factorial(j + 1) for j in range(count)])
     half = ops.constant(Fraction(1, 2))
     for _ in range(_HALVINGS):
         phi = ring.plus(phi, ring.times(value, phi), half)
@@ -91,7 +94,7 @@ def inverse_jacobian_of_exp(ops: Arithmetic, ad: Matrix, even: EvenSpectrum, rel
     """a/(e^a - 1) at a = sign ad: a/2 coth(a/2) by its three nearest poles and a series, and -a/2."""
     ring, powers = even_ring(ops, related_product(ops, ad, ad, 1, relation), even, relation)
     poles = [four_pi_squared() * k * k for k in range(1, _POLES + 1)]
-    total = ring.series([_remainder(j, poles) for j in range(_REMAINDER_TERMS)])
+    total = ring.series([_remainder(j, poles) for j in range(terms(ops, _REMAINDER_TERMS, _REMAINDER_FLOAT_TERMS))])
     for pole in poles:
         total = ring.plus(total, ring.over_linear(ops.constant(pole)), 2)
     total = ring.shifted(total)
@@ -135,8 +138,9 @@ def _powers(ops: Arithmetic, A: Matrix, highest: int, relation: Relation) -> lis
 def _half_scale(ring: QuotientRing, step: int = 0, sign: int = 1) -> tuple[Element, Element]:
     """cosh(t/2) - 1 and sinh(t/2)/t in t^2, or in t (step 1) and with sign -1 cos(t/2) - 1 and sin(t/2)."""
     scale = Fraction(1, 2**_HALVINGS)
-    even = [Fraction(0)] + [sign**j * scale ** (2 * j) / factorial(2 * j) for j in range(1, _EVEN_TERMS)]
-    odd = [sign**j * scale ** (2 * j + 1) / factorial(2 * j + 1) for j in range(_EVEN_TERMS)]
+    count = terms(ring.ops, _EVEN_TERMS, _EVEN_FLOAT_TERMS)
+    even = [Fraction(0)] + [sign**j * scale ** (2 * j) / factorial(2 * j) for j in range(1, count)]
+    odd = [sign**j * scale ** (2 * j + 1) / factorial(2 * j + 1) for j in range(count)]
     if step:
         even, odd = [c for e in even for c in (e, Fraction(0))], [c for o in odd for c in (Fraction(0), o)]
     V, S = ring.series(even), ring.series(odd)

@@ -1,0 +1,112 @@
+"""A^power (A^2 + q)^s e_j as exact polynomials in x, in factors: what a sum of numbers would compute term by term and mostly cancel.
+
+Of the translations of SE(3) these are +-2 (w . v) (w w^T - |w|^2) e_j, five operations and three shared by all columns instead of forty a column.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from fractions import Fraction
+
+from lie_codegen.on_demand import sympy as sp
+
+#: A homogeneous polynomial: the places of its coordinates, sorted, -> coefficient.
+Polynomial = dict[tuple[int, ...], Fraction]
+#: The same as a value, of first or second degree.
+Factor = tuple[tuple[tuple[int, ...], Fraction], ...]
+#: An entry: a coefficient, and what to multiply it with.
+Entry = tuple[Fraction, tuple[Factor, ...]]
+#: Polynomials with more terms are left to numbers.
+_MOST_TERMS = 40
+
+
+class ExactKrylov:
+    """The vectors of one start e_j, for a family with rational matrices; None where they are no short products.
+
+    Args:
+        columns: column -> row -> {coordinate: coefficient}, of A(x).
+        form: q.
+        j: of e_j.
+    """
+
+    def __init__(
+        self, columns: list[dict[int, dict[int, Fraction]]], form: Mapping[tuple[int, ...], Fraction], j: int
+    ) -> None:
+        self._columns = columns
+        self._form = form
+        self._done: dict[tuple[int, int], dict[int, Polynomial]] = {(0, 0): {j: {(): Fraction(1)}}}
+
+    def factors(self, power: int, s: int) -> dict[int, Entry] | None:
+        """Row -> entry, without the rows that vanish."""
+        entries = {}
+        for row, polynomial in self._vector(power, s).items():
+            found = _factored(polynomial)
+            if found is None:
+                return None
+            entries[row] = found
+        # What most rows have comes first, so that the coefficient before the vector meets it once.
+        count = Counter(factor for _, factors in entries.values() for factor in set(factors))
+        return {
+            row: (scale, tuple(sorted(factors, key=lambda factor: (-count[factor], factor))))
+            for row, (scale, factors) in entries.items()
+        }
+
+    def _vector(self, power: int, s: int) -> dict[int, Polynomial]:
+        if (power, s) not in self._done:
+            if s:
+                found = {row: dict(p) for row, p in self._vector(power + 2, s - 1).items()}
+                for row, p in self._vector(power, s - 1).items():
+                    _add_product(found.setdefault(row, {}), p, self._form)
+            else:
+                found = {}
+                for column, p in self._vector(power - 1, 0).items():
+                    for row, entry in self._columns[column].items():
+                        _add_product(found.setdefault(row, {}), p, {(i,): value for i, value in entry.items()})
+            left = {row: {key: value for key, value in p.items() if value} for row, p in found.items()}
+            self._done[power, s] = {row: p for row, p in left.items() if p}
+        return self._done[power, s]
+
+
+def _add_product(total: Polynomial, a: Polynomial, b: Mapping[tuple[int, ...], Fraction]) -> None:
+    for first, x in a.items():
+        for second, y in b.items():
+            key = tuple(sorted((*first, *second)))
+            total[key] = total.get(key, Fraction(0)) + x * y
+
+
+def _factored(polynomial: Polynomial) -> Entry | None:
+    if len(polynomial) > _MOST_TERMS:
+        return None
+    places = sorted({i for key in polynomial for i in key})
+    symbols = {i: sp.Symbol(f"x{i}") for i in places}
+    terms = {
+        tuple(key.count(i) for i in places): sp.Rational(v.numerator, v.denominator) for key, v in polynomial.items()
+    }
+    scale, factors = sp.Poly(terms, *symbols.values()).factor_list()
+    total = Fraction(int(scale.p), int(scale.q))
+    found: list[Factor] = []
+    for factor, multiplicity in factors:
+        if factor.total_degree() > 2:
+            return None
+        items: list[tuple[tuple[int, ...], Fraction]] = []
+        for exponents, value in factor.terms():
+            key = tuple(i for i, count in zip(places, exponents, strict=True) for _ in range(count))
+            items.append((key, Fraction(int(value.p), int(value.q))))
+        items.sort()
+        lead = items[0][1]
+        total *= lead**multiplicity
+        found += [tuple((key, value / lead) for key, value in items)] * multiplicity
+    return total, _paired(sorted(found))
+
+
+def _paired(
+    factors: list[tuple[tuple[tuple[int, ...], Fraction], ...]],
+) -> tuple[tuple[tuple[tuple[int, ...], Fraction], ...], ...]:
+    """Two coordinates are one monomial, which the squares of A share."""
+    single = [factor for factor in factors if len(factor) == 1 and len(factor[0][0]) == 1]
+    rest = [factor for factor in factors if factor not in single]
+    while len(single) > 1:
+        (a,), (b,) = single.pop()[0][0], single.pop()[0][0]
+        rest.append((((min(a, b), max(a, b)), Fraction(1)),))
+    return (*rest, *single)
