@@ -20,6 +20,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.propagate_cases import Case, chain_case
 from lie_codegen.benchmarks.propagate_ours import own_rows
 from lie_codegen.benchmarks.propagate_peers import TOOLS
+from lie_codegen.benchmarks.propagate_targets import COUNTS, target_rows
 
 #: (qubits, members, tolerances).
 CASES = ((1, 1, (1e-6, 1e-9, 1e-12)), (1, 1000, (1e-10,)), (2, 1, (1e-6, 1e-9, 1e-12)), (3, 1, (1e-6, 1e-9, 1e-12)))
@@ -28,6 +29,8 @@ RATIOS = (
     ("qubit", 1e-12, "scipy DOP853", 200.0),
     ("qubit", 1e-12, "heyoka", 1.0),
     ("1000 qubits", 1e-10, "heyoka", 1.0),
+    *((f"{count:,} exp of SE(3)", 1e-14, "into out=", 1 / 1.3) for count in COUNTS),
+    (f"{COUNTS[-1]:,} exp of SE(3)", 1e-14, "bytes moved", 0.8),
 )
 #: (system, tolerance, at most so many ms of our processor time).
 LIMITS = (
@@ -39,6 +42,9 @@ LIMITS = (
     ("PD loop", 1e-10, 3.0),
     ("PD loop, another inertia", 1e-10, 5.0),
     ("10,000 PD loops, 500 steps", 1e-6, 1000.0),
+    ("a process to a law", 0.0, 300.0),
+    ("a process to a plan", 0.0, 400.0),
+    ("a process to a run", 0.0, 250.0),
 )
 #: An error far above what was asked for is no result; ours is held to this many times the tolerance.
 _SLACK, _PEER_SLACK = 10.0, 1e4
@@ -93,7 +99,7 @@ def bench_propagate(
             say(f"{case.name}, {rtol:g}")
             rows += _with_ratios(_compete(case, rtol, tools))
     if own:
-        rows += [PropagateRow(*row) for row in own_rows(say)]
+        rows += [PropagateRow(*row) for row in (*own_rows(say), *target_rows(say))]
     return rows, missed(rows)
 
 

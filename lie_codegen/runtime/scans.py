@@ -140,15 +140,17 @@ def scan_reduced(
 
 def _ways(step: Compiled[Any], reduce: Mapping[str, str]) -> Iterator[int]:
     others = {each.name: each for each in step.outputs[1:]}
+    if not isinstance(reduce, Mapping):
+        raise InputError(f"{step.name}.scan_batch: reduce= is {{output: reduction}}, given {shown(reduce)}")
     for name, way in reduce.items():
         if name not in others:
             known = ", ".join(others) or "it has none"
             raise InputError(
-                f"{step.name}.scan_batch: reduce= takes outputs behind the state ({known}), given {name!r}"
+                f"{step.name}.scan_batch: reduce= takes outputs behind the state ({known}), given {shown(name)}"
             )
-        if way not in REDUCTIONS or (others[name].is_complex and way in ("max", "min")):
+        if not isinstance(way, str) or way not in REDUCTIONS or (others[name].is_complex and way in ("max", "min")):
             ways = [each for each in REDUCTIONS if not (others[name].is_complex and each in ("max", "min"))]
-            raise InputError(f"{step.name}.scan_batch: {name} is reduced by {', '.join(ways)}; given {way!r}")
+            raise InputError(f"{step.name}.scan_batch: {name} is reduced by {', '.join(ways)}; given {shown(way)}")
     for each in step.outputs:
         yield REDUCTIONS[reduce[each.name]][0] if each.name in others and each.name in reduce else 0
 
