@@ -99,7 +99,8 @@ def bench_propagate(
             say(f"{case.name}, {rtol:g}")
             rows += _with_ratios(_compete(case, rtol, tools))
     if own:
-        rows += [PropagateRow(*row) for row in (*own_rows(say), *target_rows(say))]
+        rows += [PropagateRow(*row) for row in own_rows(say)]
+        rows += [PropagateRow(*row) for row in target_rows(say)]
     return rows, missed(rows)
 
 
