@@ -13,7 +13,7 @@
  *   Left-invariant: X' = X hat(u), u in the body frame.
  *   Product of exponentials: X = exp(g1 A1) ... exp(gn An), in basis order.
  *   SI units and radians.
- *   Numerics version 2 of lie_codegen: the same number and definition, the same arithmetic.
+ *   Numerics version 1 of lie_codegen: the same number and definition, the same arithmetic.
  *   Order of the basis, and so of every vector:
  *     0: w1 [rad]
  *     1: w2 [rad]
