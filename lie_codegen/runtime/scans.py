@@ -6,26 +6,36 @@ from collections import namedtuple
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.codegen.signature import is_step, python_field
+from lie_codegen.codegen.signature import Signature, is_step, python_field
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.arguments import bind, checked, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import Strides, loops
+from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.patience import progress
 from lie_codegen.runtime.threads import CALLS, in_parts, step_pieces, stopped
 
-if TYPE_CHECKING:
-    from lie_codegen.runtime.call import Compiled
+
+class Step(Protocol):
+    """What a loop needs to know of a compiled kernel."""
+
+    name: str
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    signature: Signature
+    backend: Backend
+
 
 #: How an output behind the state is reduced -> (its number in C, what it is of no step).
 REDUCTIONS = {"sum": (1, 0.0), "max": (2, -np.inf), "min": (3, np.inf), "last": (4, np.nan)}
 
 
-def check_loop(step: Compiled[Any], form: str, n: Any, every: Any) -> None:
+def check_loop(step: Step, form: str, n: Any, every: Any) -> None:
     """The kernel can be iterated, and n is a number of steps.
 
     Raises:
@@ -40,7 +50,7 @@ def check_loop(step: Compiled[Any], form: str, n: Any, every: Any) -> None:
         raise InputError(f"{step.name}.{form}: n = {n} is no multiple of every = {every}")
 
 
-def scan(step: Compiled[Any], args: Sequence[Any], named: Mapping[str, Any], n: int, every: int, out: Any) -> Array:
+def scan(step: Step, args: Sequence[Any], named: Mapping[str, Any], n: int, every: int, out: Any) -> Array:
     """`Compiled.scan`."""
     check_loop(step, "scan", n, every)
     start, *rest = bind(step.signature, args, named)
@@ -72,7 +82,7 @@ def scan(step: Compiled[Any], args: Sequence[Any], named: Mapping[str, Any], n: 
 
 
 def scan_batch(
-    step: Compiled[Any], args: Sequence[Any], named: Mapping[str, Any], n: int, every: int, out: Any, threads: int
+    step: Step, args: Sequence[Any], named: Mapping[str, Any], n: int, every: int, out: Any, threads: int
 ) -> Array:
     """`Compiled.scan_batch` with its trajectories."""
     check_loop(step, "scan_batch", n, every)
@@ -104,7 +114,7 @@ def scan_batch(
 
 
 def scan_reduced(
-    step: Compiled[Any], args: Sequence[Any], named: Mapping[str, Any], n: int, reduce: Mapping[str, str], threads: int
+    step: Step, args: Sequence[Any], named: Mapping[str, Any], n: int, reduce: Mapping[str, str], threads: int
 ) -> Any:
     """`Compiled.scan_batch` with `reduce`: nothing along the way is stored."""
     check_loop(step, "scan_batch", n, 1)
@@ -138,7 +148,7 @@ def scan_reduced(
     return namedtuple(f"{step.name}_reduced", fields)(states, *kept.values())
 
 
-def _ways(step: Compiled[Any], reduce: Mapping[str, str]) -> Iterator[int]:
+def _ways(step: Step, reduce: Mapping[str, str]) -> Iterator[int]:
     others = {each.name: each for each in step.outputs[1:]}
     if not isinstance(reduce, Mapping):
         raise InputError(f"{step.name}.scan_batch: reduce= is {{output: reduction}}, given {shown(reduce)}")
