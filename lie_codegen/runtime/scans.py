@@ -13,6 +13,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, is_step, python_field
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.identifiers import shown
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.arguments import bind, checked, dtype_of, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import Strides, loops
