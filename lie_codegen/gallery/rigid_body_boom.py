@@ -83,8 +83,9 @@ def rigid_body_boom(folder: Path, progress: Callable[[str], None] = lambda line:
     axes[2, 1].plot(t, g13 * slow.k * third, color=BLUE, label="averaged amplitude")
     axes[2, 1].plot(t, -g13 * slow.k * third, color=BLUE)
     axes[2, 1].set(xlabel="t [s]", ylabel="$\\ell_1$", title="(f) $\\ell_1$ and its averaged amplitude $r_1$")
+    axes[2, 0].set_ylim(44, 59)
     axes[2, 0].legend(loc="upper left")
-    axes[2, 1].set_ylim(-0.85, 1.3)
+    axes[2, 1].set_ylim(-0.85, 1.5)
     axes[2, 1].legend(loc="upper left")
     caption(
         figure, "The boom grows with $\\epsilon t$ until $k^2$ nears 1/2; (28) is integrated, (32) is its closed form."

@@ -114,7 +114,7 @@ def tumbling_debris(folder: Path, progress: Callable[[str], None] = lambda line:
     values = [cost["averaged"], cost["direct_of_equal_error"], cost["direct"]]
     bars = axes[1, 1].barh(names, values, color=[_BLUE, _GREY, _GREY])
     axes[1, 1].bar_label(
-        bars, [f" {value / values[0]:.0f} x" if value > values[0] else " 1" for value in values], fontsize=9
+        bars, [f"{value / values[0]:.0f} x" if value > values[0] else "1" for value in values], padding=6, fontsize=9
     )
     axes[1, 1].set(
         xscale="log",
