@@ -31,7 +31,7 @@ _WIDTH = 0.01
 
 
 class Planned(Protocol):
-    """What a plan must have: the path X(t) and the controls u(t) on [0, duration] that make it, X' = X hat(u + drift)."""
+    """What a plan must have: the path X(t) and the controls u(t) on [0, duration] that make it, X' = X hat(u), or X' = X hat(xi) where it has xi(t)."""
 
     @property
     def duration(self) -> float:
@@ -105,11 +105,11 @@ def plan_reference(group: MatrixGroup, plan: Planned, *, smoothing: float | None
 
 
 def _velocity(group: MatrixGroup, plan: Planned, t: Array) -> Array:
-    u = np.asarray(plan.u(t), dtype=float)
-    if u.shape != (len(t), group.dim):
-        raise ShapeError(f"reference: u(t) of the plan has shape {u.shape} for {len(t)} times on {group.name}")
-    drift = getattr(plan, "details", {}).get("drift")
-    return u if drift is None else np.asarray(u + np.asarray(drift, dtype=float))
+    # a plan knows its own body velocity, which is not u where there is a drift, where the controls act from the left or are torques
+    velocity = np.asarray(getattr(plan, "xi", plan.u)(t), dtype=float)
+    if velocity.shape != (len(t), group.dim):
+        raise ShapeError(f"reference: u(t) of the plan has shape {velocity.shape} for {len(t)} times on {group.name}")
+    return velocity
 
 
 def _pieces(group: MatrixGroup, plan: Planned, duration: float, width: float) -> list[_Piece]:

@@ -268,6 +268,19 @@ class Plan(Saved):
         found: Array = path[place[: times.size]].reshape(*times.shape, *path.shape[1:])
         return found
 
+    def xi(self, t: ArrayLike) -> Array:
+        """(n,) at a time, (k, n) at (k,) times: the body velocity of X(t), X' = X hat(xi), whatever the controls are.
+
+        It is u + drift where the controls are velocities, Ad(X^-1) of that for a right-invariant system, and integrated under torques.
+
+        Raises:
+            InputError: a time is outside [0, duration].
+        """
+        times = np.asarray(t, dtype=float)
+        self.u(times.ravel())  # refuses times outside
+        found: Array = import_module(PATH).body_velocities(self, times.ravel()).reshape(*times.shape, self.group.dim)
+        return found
+
     def __simulate__(self, group: MatrixGroup | None, **options: Any) -> Any:
         """`lc.simulate` of this plan."""
         return import_module(PATH).simulated(self, group, **options)

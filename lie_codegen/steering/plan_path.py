@@ -63,6 +63,30 @@ def states(plan: Plan, t: Array) -> Array:
     return simulated(plan, t=t).X
 
 
+def body_velocities(plan: Plan, t: Array) -> Array:
+    """xi (k, n) with X' = X hat(xi) along the path of `states`, at times (k,) in any order.
+
+    Of a right-invariant system X' = hat(a) X it is Ad(X^-1) a; under torques it is integrated with X.
+    """
+    details, system = plan.details, plan.details.get("system")
+    if details.get("inertia") is not None or (system is not None and system.right):
+        knots, place = np.unique(np.append(0.0, t), return_inverse=True)
+        flown = simulated(plan, t=knots)
+        if isinstance(flown, Replay) and flown.xi is not None:
+            return np.asarray(flown.xi[place[1:]])
+        X, a = flown.X[place[1:]], np.asarray(_velocity(plan)(t))
+        return plan.group.project(np.linalg.solve(X, np.tensordot(a, plan.group.basis, 1)) @ X)
+    return np.asarray(_velocity(plan)(t))
+
+
+def _velocity(plan: Plan) -> Controls:
+    """The velocity that the controls and the drift make, on the side that the plan's system says."""
+    system, drift = plan.details.get("system"), plan.details.get("drift")
+    if system is not None:
+        return Controls(Drive(system, plan.details["inputs"], True), plan.u.breakpoints)
+    return plan.u if drift is None else plan.u.plus(np.asarray(drift, dtype=float))
+
+
 def simulated(
     plan: Plan,
     group: MatrixGroup | None = None,
@@ -90,11 +114,7 @@ def simulated(
     details = plan.details
     system = details.get("system")
     if details.get("inertia") is None and (system is None or not system.right):
-        drift = details.get("drift")
-        if system is not None:
-            velocity = Controls(Drive(system, details["inputs"], True), plan.u.breakpoints)
-        else:
-            velocity = plan.u if drift is None else plan.u.plus(np.asarray(drift, dtype=float))
+        velocity = _velocity(plan)
         start = _start(plan) if system is None else system.start
         if X0 is None and times[0] > 0:
             X0 = simulate(group, velocity, t=[0.0, times[0]], X0=start).X[-1]
@@ -135,7 +155,7 @@ def _replayed(plan: Plan, times: Array, X0: Array | None, rtol: float) -> Replay
     else:
         system: System = details["system"]
         # the inverse of X' = hat(a) X is left-invariant: Y' = -Y hat(a)
-        velocity = Controls(Drive(system, details["inputs"], True), plan.u.breakpoints).scaled(-np.ones(plan.group.dim))
+        velocity = _velocity(plan).scaled(-np.ones(plan.group.dim))
         run = simulate(plan.group, velocity, t=knots, rtol=rtol)
         path, xi, start = np.linalg.inv(run.X), None, system.start
         # the error of an inverse: |dX| = |X dY X|

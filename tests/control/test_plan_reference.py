@@ -159,3 +159,28 @@ def test_its_definition_makes_it_again() -> None:
         lc.reference("so3", times=[0, 0.5, 1.1, 1.5, 2], samples=[np.eye(3)] * 5),
     ):
         assert made_from(made.definition) == made
+
+
+SYSTEMS = {
+    "a drift of time": {"method": "direct", "drift": ("0", "0", "0.3*cos(2*t)")},
+    "a right-invariant system": {"method": "direct", "equation": "right", "drift": (0, 0, 0.3), "bounds": 4},
+    "a start": {"start": expm(SO3.hat(np.array([0.2, 0.1, 0.0])))},
+}
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_the_body_velocity_of_a_plan_is_that_of_its_path(system: str) -> None:
+    """xi(t) against differences of X(t); a reference of the plan was made from u alone, and refused."""
+    plan = lc.steer("so3", TARGET, ("w1", "w2"), 2.0, **SYSTEMS[system])
+    rng = np.random.default_rng(4)
+    marks = np.asarray(plan.u.breakpoints, dtype=float)
+    t = rng.uniform(0.01, 1.99, 40)
+    t = t[np.abs(t[:, None] - np.append(marks, 9.0)).min(axis=1) > 1e-4]
+    step = 1e-5
+    slope = (plan.X(t + step) - plan.X(t - step)) / (2 * step)
+    moved = np.array([SO3.vee(np.linalg.solve(X, dX)) for X, dX in zip(plan.X(t), slope, strict=True)])
+    np.testing.assert_allclose(plan.xi(t), moved, atol=1e-7)
+    assert plan.xi(0.7).shape == (3,)
+    reference = lc.reference("so3", plan, smoothing=0.01)
+    assert reference.error < 1e-8
+    assert reference.smoothing_error < 1e-4

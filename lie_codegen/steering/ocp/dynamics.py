@@ -101,17 +101,21 @@ def _listed(names: Any) -> str:
 
 
 def _array(value: ArrayLike, shape: Shape, what: str, where: str) -> Array:
-    array = np.asarray(value, dtype=float)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{where}: {what} takes numbers; what depends on t, X, u or parameters goes into velocity=, force= or rates="
+        ) from None
     if array.shape != shape or not np.isfinite(array).all():
         raise ShapeError(f"{where}: {what} has shape {array.shape}; it is {shape}, finite")
     return array
 
 
 def _matrix(value: ArrayLike, n: int, what: str, where: str) -> Array:
-    array = np.asarray(value, dtype=float)
-    if array.shape == ():
-        return np.eye(n) * _array(array, (), what, where)
-    return np.diag(_array(array, (n,), what, where)) if array.ndim == 1 else _array(array, (n, n), what, where)
+    if isinstance(value, str) or np.ndim(value) == 0:
+        return np.eye(n) * _array(value, (), what, where)
+    return np.diag(_array(value, (n,), what, where)) if np.ndim(value) == 1 else _array(value, (n, n), what, where)
 
 
 def _rows(matrix: Array) -> Rows:
