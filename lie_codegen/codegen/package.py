@@ -15,6 +15,7 @@ from lie_codegen.codegen.library_sources import LibrarySources
 from lie_codegen.codegen.numerics import NUMERICS_VERSION
 from lie_codegen.codegen.opcodes import REALS, Target
 from lie_codegen.codegen.signature import Signature, is_step
+from lie_codegen.codegen.stack import stack_bytes
 from lie_codegen.codegen.tape import tape_of
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.vectors import TestVector, make_vectors
@@ -72,6 +73,7 @@ def render_package(
         (shown, _rows(kernel, each, target)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)
     ]
     more = sorted(extra or {})
+    stack = {kernel.symbol: most for kernel in view.kernels if (most := stack_bytes(kernel)) is not None}
     files = {
         "sources": [f"src/{namespace}.c", *(path for path in more if path.startswith("src/") and path.endswith(".c"))],
         "headers": [f"include/{namespace}.h", *(path for path in more if path.startswith("include/"))],
@@ -89,10 +91,10 @@ def render_package(
         f"{namespace}Config.cmake.in": render("Config.cmake.in.jinja", package=view),
         "example.c": render("example.c.jinja", package=view, checks=checks, tolerance=repr(TOLERANCES[real])),
         "test_vectors.csv": render("test_vectors.csv.jinja", rows=_csv_rows(kernels, vectors)),
-        "README.md": render("README.md.jinja", package=view, **files),
+        "README.md": render("README.md.jinja", package=view, stack=stack, **files),
         **(extra or {}),
     }
-    return {**tree, "manifest.json": _manifest(view, kernels, tree, starts or {}, schedule or {})}
+    return {**tree, "manifest.json": _manifest(view, kernels, tree, stack, starts or {}, schedule or {})}
 
 
 def _declared(header: str) -> list[tuple[str, str, str]]:
@@ -212,6 +214,7 @@ def _manifest(
     view: PackageView,
     kernels: Sequence[Kernel],
     tree: Mapping[str, str],
+    stack: Mapping[str, int],
     starts: Mapping[str, Mapping[str, tuple[float, ...]]],
     schedule: Mapping[str, str | int | float],
 ) -> str:
@@ -223,6 +226,7 @@ def _manifest(
         "numerics": NUMERICS_VERSION,
         **({"real": view.type_name} if view.type_name != "double" else {}),
         "functions": [_function(kernel, starts.get(kernel.symbol)) for kernel in kernels],
+        **({"stack_bytes": dict(stack)} if stack else {}),
         **({"schedule": dict(schedule)} if schedule else {}),
         "files": {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(tree.items())},
     }

@@ -12,9 +12,10 @@ import pytest
 
 import lie_codegen as lc
 from lie_codegen.algebra.controllability import require_controllable
+from lie_codegen.codegen.stack import LIBRARY
 from lie_codegen.steering.shooting.package import render_steering_package
 from lie_codegen.steering.shooting.source import steering_view
-from lie_codegen.steering.shooting.stack import LANES, LIBRARY, stack_bytes, workspace_bytes
+from lie_codegen.steering.shooting.stack import LANES, stack_bytes, workspace_bytes
 from lie_codegen.steering.shooting.views import SteeringView
 
 COMPILER = shutil.which("gcc")

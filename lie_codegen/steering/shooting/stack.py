@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from lie_codegen.codegen.stack import FRAME, LIBRARY
+
 if TYPE_CHECKING:
     from lie_codegen.steering.shooting.views import SteeringView
 
 #: As in steering_core.c: lanes where the compiler has vectors, Runge-Kutta steps and candidates kept, rows of the extrapolation.
 LANES, _NODES, _KEPT, _ROWS = 8, 129, 8, 8
-#: Registers saved, arguments passed on the stack, alignment of vectors: of a frame, twelve frames deep; libm.
-_FRAMES, LIBRARY = 12 * 320, 2048
+#: Twelve frames deep.
+_FRAMES = 12 * FRAME
 
 
 def workspace_bytes(view: SteeringView, lanes: int) -> int:
