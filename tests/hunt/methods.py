@@ -70,7 +70,7 @@ OBJECTS: Makers = {
     "estimate": lambda: lc.Uncertain("so3", np.eye(3), np.eye(3) * 1e-4),
     "body": plausible._body,
     "flow": plausible._flow,
-    "law": plausible._law,
+    "law": cache(lambda: lc.build(plausible._law()).tracking_law),
     "uniform": lambda: lc.Uniform(0.0, 1.0),
     "normal": lambda: lc.Normal(0.0, 1.0),
 }
@@ -93,6 +93,9 @@ PLAUSIBLE: Makers = {
     "A": lambda: np.zeros((3, 3)),
     "xi": lambda: [0.1, 0.2, 0.3],
 }
+_AT_REST: Makers = {
+    "X": lambda: np.eye(3), "xi": lambda: np.zeros(3), "X_d": lambda: np.eye(3), "xi_d": lambda: np.zeros(3), "xi_d_dot": lambda: np.zeros(3),
+}  # fmt: skip
 #: Arguments that a method takes by **, and every optional one that is worth a try.
 BY_METHOD: dict[tuple[str, str], Makers] = {
     ("controller", "step"): {"X": lambda: np.eye(3), "t": lambda: 0.1, "Xd": lambda: np.eye(3)},
@@ -105,6 +108,8 @@ BY_METHOD: dict[tuple[str, str], Makers] = {
     ("propagator", "batch"): {"k": lambda: [1.0, 2.0]},
     ("propagator", "power"): {"n": lambda: 3, "k": lambda: 1.0},
     ("propagator", "gradient"): {"k": lambda: 1.0},
+    ("law", "__call__"): _AT_REST,
+    ("law", "batch"): {**_AT_REST, "xi": lambda: np.zeros((3, 3))},
     ("exp", "__call__"): {"x": lambda: [0.1, 0.2, 0.3]},
     ("exp", "batch"): {"x": lambda: np.ones((3, 3))},
     ("wei_norman_rate", "__call__"): {"g": lambda: [0.1, 0.2, 0.3], "u": lambda: [0.1, 0.2, 0.3]},

@@ -79,6 +79,22 @@ def test_samples_at_no_time_are_no_numbers() -> None:
     assert np.isnan(held([0.2, np.nan])).all(axis=1).tolist() == [False, True]
 
 
+def test_an_estimate_flows_long_without_long_work() -> None:
+    """Pieces are put together two by two; a turn by 1e12 is the last that is one."""
+    Q = np.diag([1e-6, 2e-6, 3e-6])
+    estimate = lc.Uncertain("so3", np.eye(3), np.eye(3) * 1e-4)
+    for u, duration in (([1e300] * 3, 1.0), ([0.1, 0.2, 0.3], HUGE), ([0.1, 0.2, 0.3], 1e300), ([1e300] * 3, 1e300)):
+        with pytest.raises(LieCodegenError):
+            hostile.alarmed(4.0, lambda u=u, duration=duration: estimate.flow(u, duration))
+    whole, rate = estimate, [0.1, 0.2, 0.3]
+    for _ in range(40):
+        whole = whole.flow(rate, 2.5, Q)
+    at_once = estimate.flow(rate, 100.0, Q)
+    np.testing.assert_allclose(at_once.covariance, whole.covariance, rtol=1e-11, atol=1e-16)
+    long = hostile.alarmed(4.0, lambda: estimate.flow(rate, 1e10, 1e-6 * Q).covariance)
+    assert np.trace(long) == pytest.approx(3e-4 + 6e-12 * 1e10, rel=1e-4)
+
+
 def test_counts_without_end_are_refused() -> None:
     controller = methods._controller()
     for count in (HUGE, 10**5000, True, 2.0):

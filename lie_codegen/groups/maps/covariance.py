@@ -14,10 +14,16 @@ the other factor. Along X' = X hat(u + w), w white of density Q: S' = -ad_u S - 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.errors import InputError
 from lie_codegen.on_demand import scipy
+
+#: The largest |ad_u| T: an angle of this size is known to 1e-4.
+LONGEST = 1e12
 
 
 def compounded(ads: Array, first: Array, second: Array, order: int) -> tuple[Array, Array]:
@@ -43,15 +49,25 @@ def flowed(ads: Array, u: Array, duration: float, covariance: Array, noise: Arra
     """The covariance after `duration` at the body velocity u: F S F^T + int_0^T e^{-s ad_u} Q e^{-s ad_u^T} ds.
 
     Both parts come from one exponential, Van Loan's: exp([[ad_u, Q], [0, -ad_u^T]] T) holds the integral beside F^-1.
-    It squares the conditioning of F, so long times are cut into pieces over which F stays moderate.
+    It squares the conditioning of F, so long times are cut into pieces over which F stays moderate; pieces are put together two by two.
+
+    Raises:
+        InputError: so long a motion that rounding leaves nothing of it.
     """
     n = len(u)
     ad_u = np.einsum("k,kab->ab", u, ads)
-    pieces = max(1, int(np.ceil(np.linalg.norm(ad_u, 1) * duration)))
-    h = duration / pieces
+    amount = float(np.linalg.norm(ad_u, 1)) * duration
+    if not amount <= LONGEST:
+        raise InputError(
+            f"Uncertain.flow: |ad_u| T = {amount:g} is beyond {LONGEST:g}, from where rounding leaves nothing of the motion; give a smaller u or duration"
+        )
+    doublings = max(0, math.ceil(math.log2(amount))) if amount > 0 else 0
+    h = duration / 2**doublings
     block = scipy.linalg.expm(h * np.block([[ad_u, noise], [np.zeros((n, n)), -ad_u.T]]))
     step = block[n:, n:].T  # exp(-h ad_u)
     added = step @ block[:n, n:]
-    for _ in range(pieces):
-        covariance = step @ covariance @ step.T + added
+    for _ in range(doublings):
+        added = step @ added @ step.T + added
+        step = step @ step
+    covariance = step @ covariance @ step.T + added
     return np.asarray((covariance + covariance.T) / 2)

@@ -99,7 +99,7 @@ class Uncertain(Saved):
             noise: (n, n) Q, symmetric, no negative eigenvalue; zero when None.
 
         Raises:
-            ShapeError, NotFiniteError, InputError: about what does not fit.
+            ShapeError, NotFiniteError, InputError: about what does not fit; |ad_u| T beyond 1e12, of which rounding leaves nothing.
         """
         n = self.group.dim
         velocity = np.asarray(u, dtype=float)
@@ -110,8 +110,8 @@ class Uncertain(Saved):
         if duration < 0:
             raise InputError(f"Uncertain.flow: noise does not run backwards; duration = {duration:g} is negative")
         Q = np.zeros((n, n)) if noise is None else _covariance(noise, n, "Uncertain.flow: noise")
-        step = build(self.group).exp(np.ascontiguousarray(duration * velocity))
         S = flowed(self.group.algebra.ad_matrices, velocity, float(duration), self.covariance, Q)
+        step = build(self.group).exp(np.ascontiguousarray(duration * velocity))
         shift = np.linalg.inv(self._adjoint(step)) @ self.mean_shift
         return Uncertain(self.group, self.X @ step, S, shift)
 
