@@ -17,7 +17,7 @@ import numpy as np
 from lie_codegen.averaging.averaged import Averaged
 from lie_codegen.errors import InputError
 from lie_codegen.exact.expression import time_symbol
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.matrices import matrix_port
 from lie_codegen.groups.wei_norman.body import product_exp, rate
@@ -81,7 +81,7 @@ def averaged_rate(averaged: Averaged, statement: str = "") -> Kernel:
 def averaged_state(averaged: Averaged, statement: str = "") -> Kernel:
     """(eps, t, parameters) -> X."""
     group, symbols = averaged.group, averaged.parameters
-    data = GroupDerivation(group)
+    data = derivation_of(group)
 
     def body(ops: Arithmetic, eps: Scalar, t: Scalar, *values: Scalar) -> tuple[Any, ...]:
         evaluate = ExpressionEvaluator(ops, {time_symbol(): t, **dict(zip(symbols, values, strict=True))})
@@ -112,7 +112,7 @@ def averaged_state(averaged: Averaged, statement: str = "") -> Kernel:
 def averaged_wei_norman(averaged: Averaged) -> Kernel:
     """(eps, g, parameters) -> g_dot: the averaged Wei-Norman equations (11); Phi(gbar(t)) = X(0) exp(eps t U_av), Theorem 1."""
     group, symbols = averaged.group, averaged.parameters
-    data = GroupDerivation(group)
+    data = derivation_of(group)
 
     def body(ops: Arithmetic, eps: Scalar, g: Sequence[Scalar], *values: Scalar) -> tuple[Any, ...]:
         evaluate = ExpressionEvaluator(ops, dict(zip(symbols, values, strict=True)))

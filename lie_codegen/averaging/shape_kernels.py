@@ -7,9 +7,9 @@ from typing import Any
 
 from lie_codegen.averaging.shape_form import ShapeForm
 from lie_codegen.errors import InputError
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import matrix_port, random_element
 from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.brackets import bracket
@@ -37,7 +37,7 @@ def connection_kernels(connection: ShapeForm, harmonics: int = 3, namespace: str
         )
     group, n, k = connection.group, connection.group.dim, connection.size
     symbols = sp.symbols(" ".join(connection.shape), real=True, seq=True)
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
 
     def at(ops: Arithmetic, r: Vector) -> Matrix:
         evaluate = ExpressionEvaluator(ops, dict(zip(symbols, r, strict=True)))

@@ -30,11 +30,10 @@ from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, mo
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number, symmetric_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -82,7 +81,7 @@ class AdaptiveLaw(Kernel):
         for step, time in zip(np.gradient(times), times, strict=True):
             _, xi, rate = evaluate(ops, float(time))
             turned = rate  # [xi, nu] = 0 for nu = xi
-            real = RealMatrices(reference.group)
+            real = derivation_of(reference.group).real
             columns = [
                 feedforward_force(
                     ops, real, constant_matrix(ops, B), self.feedforward, xi, list(xi), list(rate), list(turned)
@@ -147,7 +146,7 @@ def adaptive_law(
         *input_parameters(pair),
     )
     a0 = _start(start, matrices, n)
-    real = RealMatrices(group)
+    real = derivation_of(group).real
     physical = project and group.dim == 3 and group.degree == 3
 
     def body(
@@ -169,7 +168,7 @@ def adaptive_law(
             drift = kept_physical(ops, matrices, Gamma, a, drift, a0)
         return force, drift, phi
 
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         vectors = [[rng.uniform(-1, 1) for _ in range(n)] for _ in range(3)]

@@ -21,7 +21,7 @@ from lie_codegen.control.attitude_ports import (
 from lie_codegen.control.reduced_attitude_law import reduced_law
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import jacobian
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.rotation_log import rotation_log
@@ -166,7 +166,7 @@ def _proportional(k_p: Parameter, tracking: bool) -> Kernel:
 
 def _proportional_derivative(parameters: Sequence[Parameter], gyroscopic: str, tracking: bool) -> Kernel:
     factor = gyroscopic_factor(gyroscopic)
-    derivation = GroupDerivation(group("so3"))
+    derivation = derivation_of(group("so3"))
 
     def body(ops: Arithmetic, X: Matrix, omega: Vector, *given: Any) -> tuple[Any, ...]:
         E, numbers = (_relative(X, given[0]), given[3:]) if tracking else (X, given)

@@ -19,6 +19,7 @@ from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_inputs import at_numbers
 from lie_codegen.errors import ExpressionError, IncompatibleError, InputError
 from lie_codegen.exact.exponential import MatrixExponential
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.wei_norman.data import WeiNormanData
@@ -60,9 +61,9 @@ class Compatibility(Saved):
 
 def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
     """Checks (A2), and that phi is locally positive definite."""
-    error, real = at_numbers(error), RealMatrices(error.group)
+    error, real = at_numbers(error), derivation_of(error.group).real
     rng = random.Random(seed)
-    data = WeiNormanData(error.group)
+    data = derivation_of(error.group).wei_norman
     if error.uses_log:
         return _in_floats(error, real, data, rng)
     try:
@@ -160,7 +161,7 @@ def _positive(
 
 def _element(ops: PlainArithmetic, data: WeiNormanData, rng: random.Random) -> Matrix:
     """A product of exponentials in the given arithmetic."""
-    size = RealMatrices(data.group).size
+    size = derivation_of(data.group).real.size
     value: Matrix = identity(size)
     for exponential in data.defining:
         x = ops.constant(Fraction(rng.randint(-100, 100), 97))
@@ -175,7 +176,7 @@ def _rational(data: WeiNormanData, rng: random.Random) -> Matrix:
     Raises:
         ArithmeticError: a basis element has none of the known kinds.
     """
-    size = RealMatrices(data.group).size
+    size = derivation_of(data.group).real.size
     value: Matrix = identity(size)
     for exponential in data.defining:
         value = matmul(value, _rational_factor(exponential, rng, size))

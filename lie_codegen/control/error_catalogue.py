@@ -25,8 +25,8 @@ from lie_codegen.control.error_inputs import refuse_inputs
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.parameter import input_symbols, is_input
@@ -175,7 +175,7 @@ def _geodesic(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunction:
     K, inputs = _read_gain(gains, "K_p", name, n)
     phi = _square(K, sp.Matrix(ErrorSymbols(group).log_right)) / 2
     least = None
-    if RealMatrices(group).rigid is not None and n == 3 and not inputs:
+    if derivation_of(group).real.rigid is not None and n == 3 and not inputs:
         least = float(eigenvalues(K)[0]) * math.pi**2 / 2  # phi on the cut, |x| = pi
     return ErrorFunction(
         name,

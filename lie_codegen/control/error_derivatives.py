@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.exponential import jacobian
 from lie_codegen.groups.maps.log_routine import closed_log, log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices
@@ -119,9 +119,7 @@ class ErrorDerivatives:
                     if expression is not None
                 ):
                     values.update(
-                        zip(
-                            coordinates, logarithm(self.dual, GroupDerivation(self.real.group), matmul(*E)), strict=True
-                        )
+                        zip(coordinates, logarithm(self.dual, derivation_of(self.real.group), matmul(*E)), strict=True)
                     )
         for prefix, numbers in (("X", X), ("Xi", Xi), ("Xd", Xd), ("Xdi", Xdi)):
             matrix = symbols[prefix]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 from lie_codegen.errors import InputError, ShapeError
@@ -17,8 +17,8 @@ from lie_codegen.exact.budget import current_budget
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.kernel import Port
@@ -65,17 +65,7 @@ class ErrorSymbols:
 
     def matrix(self, prefix: str) -> sp.ImmutableMatrix:
         """The real matrix of symbols of one of X, Xd, Xi, Xdi."""
-        d = self.group.degree
-        separator = "_" if d > 9 else ""
-
-        def entry(i: int, j: int, suffix: str = "") -> sp.Symbol:
-            return sp.Symbol(f"{prefix}{i + 1}{separator}{j + 1}{suffix}")
-
-        if not self.group.is_complex:
-            return sp.ImmutableMatrix(d, d, lambda i, j: entry(i, j))
-        re = sp.Matrix(d, d, lambda i, j: entry(i, j, "re"))
-        im = sp.Matrix(d, d, lambda i, j: entry(i, j, "im"))
-        return sp.ImmutableMatrix(sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re)))
+        return _symbols(self.group.degree, self.group.is_complex, prefix)
 
     @property
     def matrices(self) -> dict[str, sp.ImmutableMatrix]:
@@ -101,7 +91,7 @@ class ErrorSymbols:
     @property
     def logs(self) -> tuple[MatrixLog, ...]:
         """The products whose logarithm a text may take; on orthogonal groups the transpose of X_d is its inverse."""
-        basis = RealMatrices(self.group).basis
+        basis = derivation_of(self.group).real.basis
         products = [(self.X_d_inverse * self.X, self.log_right), (self.X * self.X_d_inverse, self.log_left)]
         if all(matrix == -matrix.T for matrix in basis):
             products += [(self.X_d.T * self.X, self.log_right), (self.X * self.X_d.T, self.log_left)]
@@ -111,6 +101,20 @@ class ErrorSymbols:
                       sp.ImmutableMatrix(names))
             for product, names in products
         )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def _symbols(d: int, is_complex: bool, prefix: str) -> sp.ImmutableMatrix:
+    separator = "_" if d > 9 else ""
+
+    def entry(i: int, j: int, suffix: str = "") -> sp.Symbol:
+        return sp.Symbol(f"{prefix}{i + 1}{separator}{j + 1}{suffix}")
+
+    if not is_complex:
+        return sp.ImmutableMatrix(d, d, lambda i, j: entry(i, j))
+    re = sp.Matrix(d, d, lambda i, j: entry(i, j, "re"))
+    im = sp.Matrix(d, d, lambda i, j: entry(i, j, "im"))
+    return sp.ImmutableMatrix(sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,7 +143,7 @@ class ErrorFunction(Saved):
     description: str = field(default="", compare=False)
     inputs: tuple[Port, ...] = ()
 
-    @property
+    @cached_property
     def uses_log(self) -> bool:
         """Whether phi or the transport holds a logarithm: then it is smooth up to the cut alone, where a turn reaches 180 degrees."""
         symbols = ErrorSymbols(self.group)

@@ -17,11 +17,10 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.flow.batched_exponential import expm
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -78,12 +77,12 @@ class ErrorSamples:
 
     def __init__(self, pair: ErrorFunction) -> None:
         self.pair, self.group = pair, pair.group
-        self.real = RealMatrices(pair.group)
+        self.real = derivation_of(pair.group).real
         self._first: _Batch | None = None
         self._second: _Batch | None = None
         self._transport: _Batch | None = None
         self._moved: _Batch | None = None
-        derivation = GroupDerivation(pair.group)
+        derivation = derivation_of(pair.group)
         if derivation.matrix_pattern is not None:
             self._moved = _Batch(_move_kernel(derivation))
 

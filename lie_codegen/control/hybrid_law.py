@@ -30,10 +30,9 @@ from lie_codegen.control.warp import gap_matrix, levels, warp_of, warped_level
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.guard import nan_off_group
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import bracket
@@ -145,7 +144,7 @@ def hybrid_law(
         InputError: equal eigenvalues of K_p, for which the gap is zero; a kappa, a direction or a hysteresis out of its bounds, with them.
     """
     group = as_group(group, "hybrid_law")
-    real = RealMatrices(group)
+    real = derivation_of(group).real
     if group.dim != 3 or real.rigid is None:
         raise InputError(f"hybrid_law is one of SO(3) with the axes as its basis, not of {group.name}")
     if feedforward not in FEEDFORWARDS:
@@ -172,7 +171,7 @@ def hybrid_law(
         raise InputError(
             f"hybrid_law: hysteresis = {delta:g} must lie between 0 and the gap {min(gaps):.6g}: above it the law can stay"
         )
-    derivation = GroupDerivation(group)
+    derivation = derivation_of(group)
 
     def body(
         ops: Arithmetic, X: Matrix, xi: Vector, X_d: Matrix, xi_d: Vector, xi_d_dot: Vector, q: Scalar, *given: Any

@@ -20,8 +20,8 @@ from lie_codegen.control.force_limits import force_limits
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.exact.positive_matrix import positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -75,7 +75,7 @@ def integral_law(
         parameter(Port("w", (), "1/s", description="rate of the anti-windup"), gains.get("w", 1), positive_number),
         *force_limits(limits, n),
     )
-    real = RealMatrices(group)
+    real = derivation_of(group).real
 
     def body(
         ops: Arithmetic, X: Any, xi: Vector, X_d: Any, xi_d: Vector, xi_d_dot: Vector, s: Vector, *given: Any

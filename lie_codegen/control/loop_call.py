@@ -9,8 +9,8 @@ from typing import Any
 from lie_codegen.control.loop_model import Loop, Own
 from lie_codegen.control.loop_ports import seen_directions
 from lie_codegen.control.plants import GroupPlant
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.linear import Vector, dot, plus, scaled
 from lie_codegen.kernel.saturation import saturated
@@ -40,7 +40,7 @@ def called(
     if loop.by_error and isinstance(plant, GroupPlant):
         # Ad_{E^-1} xi_d: with it and u = law(E), E' = E hat(law(E)), whatever the reference does.
         given["configuration"], E, E_inverse = plant.relative(ops, now["X_d"], X)
-        matrices = GroupMatrices(ops, RealMatrices(plant.group))
+        matrices = GroupMatrices(ops, derivation_of(plant.group).real)
         offset = matrices.Ad(E_inverse, E, now["xi_d"])
     if law.directions and isinstance(plant, GroupPlant):
         if seen is None:
@@ -117,7 +117,8 @@ def seen_outputs(ops: Arithmetic, loop: Loop, X: Any, noise: Vector | None) -> A
         return rows
     found, place = [], 0
     rotations = (
-        all(orthogonal for _, orthogonal in RealMatrices(loop.plant.group).blocks) and not loop.plant.group.is_complex
+        all(orthogonal for _, orthogonal in derivation_of(loop.plant.group).real.blocks)
+        and not loop.plant.group.is_complex
     )
     for row, c in zip(rows, directions, strict=True):
         off = plus(row, noise[place : place + len(row)])

@@ -13,9 +13,9 @@ from typing import Any
 
 from lie_codegen.control.loop_model import Loop
 from lie_codegen.control.loop_rate import columns, loop_rate, moves_of
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.dual import DualArithmetic, tangent_of
@@ -41,7 +41,7 @@ def loop_flow(loop: Loop, reference: Any = None) -> tuple[Kernel, ...]:
         elements, place, first = [state[i] for i in packed], 0, 0
         for move in moves:
             group, width = move.group, packed_size(move.group)
-            matrices = GroupMatrices(ops, RealMatrices(group))
+            matrices = GroupMatrices(ops, derivation_of(group).real)
             X = matrices.read(unpack(group, elements[first : first + width]))
             rate = matmul(X, matrices.hat(speeds[place : place + group.dim]))
             for i, entry in zip(packed[first : first + width], pack(group, matrices.write(rate)), strict=True):

@@ -25,9 +25,9 @@ import numpy as np
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import real_number
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -225,7 +225,7 @@ def seen_directions(
     On a complex group the c are vectors of the algebra, and Ad_(X^-1) c is what is seen: on SU(2), R(X)^T c.
     """
     if group.is_complex:
-        matrices = GroupMatrices(ops, RealMatrices(group))
+        matrices = GroupMatrices(ops, derivation_of(group).real)
         X = matrices.inverse(inverse)
         return [matrices.Ad(inverse, X, [number(ops, entry) for entry in c]) for c in directions]
     size = len(inverse)

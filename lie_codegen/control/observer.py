@@ -35,12 +35,11 @@ from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, real_rows, velocity_units
 from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import bracket
 from lie_codegen.kernel.definition import kernel_factory
@@ -193,7 +192,7 @@ def observer(
             + ("of one direction the turn about it is not seen" if count == 1 else "another vector is needed")
             + "; reduced=True takes what there is"
         )
-    derivation, real = GroupDerivation(group), RealMatrices(group)
+    derivation, real = derivation_of(group), derivation_of(group).real
 
     def body(
         ops: Arithmetic, X_hat: Any, bias: Vector, u: Vector, y: Matrix, h: Scalar, *given: Any
@@ -208,7 +207,7 @@ def observer(
         return moved, list(bias) if is_zero(i_gain) else plus(bias, scaled(h * i_gain, rate))
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
-        X = random_element(group, WeiNormanData(group), rng)
+        X = random_element(group, derivation_of(group).wei_norman, rng)
         flat = [[rng.uniform(-0.1, 0.1) for _ in range(n)] for _ in range(2)]
         y = [[rng.uniform(-1, 1) for _ in range(seen)] for _ in range(count)]
         return X, *flat, y, rng.uniform(0, 0.05), *sample_inputs(parameters, rng)

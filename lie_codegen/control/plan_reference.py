@@ -15,7 +15,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.reference_motion import PlanReference
 from lie_codegen.control.waypoints import logarithm, quintic
 from lie_codegen.errors import ComputationError, InputError, ShapeError
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.on_demand import scipy
@@ -174,7 +174,7 @@ def _refined(
     group: MatrixGroup, plan: Planned, knots: dict[float, _Knot], pieces: list[_Piece], tolerance: float
 ) -> PlanReference:
     """Segments are halved until they meet the plan; those that round off a jump stay as they are."""
-    derivation = GroupDerivation(group)
+    derivation = derivation_of(group)
     inside = np.array([0.25, 0.5, 0.75])
     # Kept by the ends of a segment: of the next round only the halves are new.
     rows: dict[tuple[float, float], NDArray[Any] | None] = {}
@@ -191,7 +191,7 @@ def _refined(
             key = (float(t[i]), float(t[i + 1]))
             if key not in rows:
                 a, b = knots[key[0]], knots[key[1]]
-                move = logarithm(group, np.linalg.solve(X[i], X[i + 1]))
+                move = logarithm(derivation, np.linalg.solve(X[i], X[i + 1]))
                 rows[key] = (
                     None if move is None else quintic(derivation, move, a.xi, b.xi, float(span), (a.rate, b.rate))
                 )

@@ -24,11 +24,10 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.flow.product_step import Move
 from lie_codegen.groups.catalogue_load import as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import plain, record_factory
@@ -180,14 +179,14 @@ class GroupPlant:
 
     def relative(self, ops: Arithmetic, X_d: Any, X: Any) -> tuple[Any, Matrix, Matrix]:
         """The error E = X_d^-1 X as a law reads it, and E and its inverse as real matrices."""
-        matrices = GroupMatrices(ops, RealMatrices(self.group))
+        matrices = GroupMatrices(ops, derivation_of(self.group).real)
         inverse = matrices.inverse(matrices.read(X_d))
         E = _product(inverse, matrices.read(X))
         return matrices.write(E), E, matrices.inverse(E)
 
     def inverse(self, ops: Arithmetic, X: Any) -> Matrix:
         """X^-1, a real matrix."""
-        matrices = GroupMatrices(ops, RealMatrices(self.group))
+        matrices = GroupMatrices(ops, derivation_of(self.group).real)
         return matrices.inverse(matrices.read(X))
 
     def starts(self, X0: ArrayLike | None, xi0: ArrayLike | None) -> tuple[Array, bool]:
@@ -204,7 +203,7 @@ class GroupPlant:
 
     def sample(self, rng: random.Random) -> list[float]:
         """Entries of a state."""
-        flat = pack(self.group, random_element(self.group, WeiNormanData(self.group), rng))
+        flat = pack(self.group, random_element(self.group, derivation_of(self.group).wei_norman, rng))
         return [*flat, *(rng.uniform(-1, 1) for _ in range(self.sizes[1]))]
 
 

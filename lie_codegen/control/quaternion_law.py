@@ -18,9 +18,9 @@ from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, mo
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.rotation_log import quaternion_of
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.brackets import bracket
@@ -61,7 +61,7 @@ def quaternion_law(
         InputError: another group, a gain that is not positive, a hysteresis outside of (0, 1), an unknown feedforward.
     """
     group = as_group(group, "quaternion_law")
-    real = RealMatrices(group)
+    real = derivation_of(group).real
     if group.dim != 3 or real.rigid is None:
         raise InputError(f"quaternion_law is one of SO(3) with the axes as its basis, not of {group.name}")
     if feedforward not in FEEDFORWARDS:

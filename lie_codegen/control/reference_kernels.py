@@ -20,10 +20,9 @@ from lie_codegen.control.reference_motion import (
 from lie_codegen.errors import InputError
 from lie_codegen.exact.expression import time_symbol
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.matrices import matrix_port, velocity_units
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import double, doubles, kernel_factory, record_factory
@@ -68,8 +67,8 @@ class ReferenceBody:
 
     def __init__(self, reference: Reference) -> None:
         self.reference = reference
-        self.derivation = GroupDerivation(reference.group)
-        self.data = WeiNormanData(reference.group)
+        self.derivation = derivation_of(reference.group)
+        self.data = derivation_of(reference.group).wei_norman
 
     def __call__(self, ops: Arithmetic, t: Scalar) -> tuple[Any, Vector, Vector]:
         if isinstance(self.reference, FormulaReference):

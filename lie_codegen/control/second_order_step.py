@@ -18,11 +18,11 @@ from lie_codegen.control.reference_motion import Reference
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.flow.product_step import Move, product_step
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -92,7 +92,7 @@ def held_force_step(group: MatrixGroup, inertia: Any, name: str = "held_force_st
         [Y], eta = product_step(ops, [move], [X], xi, rates, 0, h)
         return ([*pack(group, Y), *eta],)
 
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         xi, force = ([rng.uniform(-1, 1) for _ in range(group.dim)] for _ in range(2))

@@ -31,12 +31,12 @@ from lie_codegen.control.force_limits import force_limits
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star, bracket
 from lie_codegen.kernel.definition import kernel_factory
@@ -119,7 +119,7 @@ def tracking_law(
     bounded = damping_limits is not None
     check_compatibility(pair)
     check_claims(pair)
-    real, data = RealMatrices(group), WeiNormanData(group)
+    real, data = derivation_of(group).real, derivation_of(group).wei_norman
 
     def body(ops: Arithmetic, X: Any, xi: Any, X_d: Any, xi_d: Any, xi_d_dot: Any, *given: Any) -> tuple[Any, ...]:
         read = GroupMatrices(ops, real).read

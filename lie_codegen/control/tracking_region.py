@@ -16,9 +16,9 @@ from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.saved import Saved
@@ -63,7 +63,7 @@ def tracking_region(
     group = as_group(group, "tracking_region")
     pair = as_error(group, error, gains)
     metric = np.array(positive_matrix(inertia, group.dim, "inertia").tolist(), dtype=float)
-    real, ops = RealMatrices(group), FloatArithmetic()
+    real, ops = derivation_of(group).real, FloatArithmetic()
     read = GroupMatrices(ops, real).read
     at = ErrorDerivatives(ops, pair, real, read(_entries(group, X)), read(_entries(group, X_d)))
     phi, _ = at.differential(1)

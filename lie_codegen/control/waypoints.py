@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.control.reference_motion import WaypointReference
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import log_coordinates
@@ -58,20 +58,20 @@ def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLik
             f"{bad[0] + 1} at t = {t[bad[0]]:g}; times must increase"
         )
     X = np.array([admitted(group, each, f"waypoint {number}").X for number, each in enumerate(X, start=1)])
-    moves = np.array([_relative_log(group, X[i], X[i + 1], i) for i in range(len(t) - 1)])
+    derivation = derivation_of(group)
+    moves = np.array([_relative_log(derivation, X[i], X[i + 1], i) for i in range(len(t) - 1)])
     spans = np.diff(t)
     mean = moves / spans[:, None]
     speed = np.zeros((len(t), group.dim))
     weight = spans[1:] / (spans[1:] + spans[:-1])
     speed[1:-1] = weight[:, None] * mean[:-1] + (1 - weight)[:, None] * mean[1:]
-    derivation = GroupDerivation(group)
     table = [quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
     return WaypointReference(group, t, X, np.array(table))
 
 
-def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: int) -> NDArray[Any]:
+def _relative_log(derivation: GroupDerivation, X: NDArray[Any], Y: NDArray[Any], index: int) -> NDArray[Any]:
     relative = np.linalg.solve(X, Y)
-    x = logarithm(group, relative)
+    x = logarithm(derivation, relative)
     if x is not None:
         return x
     raise InputError(
@@ -80,15 +80,15 @@ def _relative_log(group: MatrixGroup, X: NDArray[Any], Y: NDArray[Any], index: i
     )
 
 
-def logarithm(group: MatrixGroup, X: NDArray[Any]) -> NDArray[Any] | None:
+def logarithm(derivation: GroupDerivation, X: NDArray[Any]) -> NDArray[Any] | None:
     """The x with exp(hat(x)) = X, or None where the principal logarithm is not in the algebra."""
-    derivation, ops = GroupDerivation(group), FloatArithmetic()
+    ops = FloatArithmetic()
     try:
         x = np.array(log_coordinates(ops, derivation, _scalars(X)), dtype=float)
         off = float(np.max(np.abs(_numbers(exp_matrix(ops, derivation, x.tolist())) - X)))
     except (ArithmeticError, ValueError):
         return None
-    turn = float(np.max(np.abs(np.linalg.eigvals(group.hat(x)).imag)))
+    turn = float(np.max(np.abs(np.linalg.eigvals(derivation.group.hat(x)).imag)))
     if turn > np.pi * (1 - 1e-9):
         return None  # the other way round is as short
     return x if off <= _ON_GROUP * max(1.0, float(np.max(np.abs(X)))) else None
@@ -155,20 +155,21 @@ def sampled_reference(group: MatrixGroup, times: ArrayLike, samples: ArrayLike) 
         raise InputError(
             f"a reference from samples needs 5 to {_MOST} of them, got {len(t)}; thin them out, or give waypoints="
         )
+    derivation = derivation_of(group)
     speed, bend = np.empty((2, len(t), group.dim))
     for i in range(len(t)):
         first = min(max(i - 2, 0), len(t) - 5)
         near = [j for j in range(first, first + 5) if j != i]
-        moves = np.array([_relative_log(group, X[i], X[j], min(i, j)) for j in near])
+        moves = np.array([_relative_log(derivation, X[i], X[j], min(i, j)) for j in near])
         width = float(np.max(np.abs(t[near] - t[i])))
         powers = ((t[near] - t[i]) / width)[:, None] ** np.arange(1, 5)
         fit = np.linalg.solve(powers, moves)
         speed[i], bend[i] = fit[0] / width, 2 * fit[1] / width**2
-    derivation, spans = GroupDerivation(group), np.diff(t)
+    spans = np.diff(t)
     table = [
         quintic(
             derivation,
-            _relative_log(group, X[i], X[i + 1], i),
+            _relative_log(derivation, X[i], X[i + 1], i),
             speed[i],
             speed[i + 1],
             float(spans[i]),

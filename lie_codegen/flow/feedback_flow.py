@@ -20,11 +20,11 @@ from lie_codegen.flow.product_rate import product_rate, reach_of, turning
 from lie_codegen.flow.product_step import Move
 from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.flow.trajectory import Trajectory
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack, varying_entries
 from lie_codegen.groups.maps.matrices import matrix_port, random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import rate as wei_norman_rate
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory, plain
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -80,7 +80,7 @@ class FeedbackTrajectory(Trajectory):
 def feedback_rate(group: MatrixGroup, u: Any, reads: str, name: str = "feedback_rate") -> Kernel:
     """(X packed, y, t, eps) -> y': y = Theta, or (Theta, g) for a feedback of the coordinates g, g' = M(g) eps u(t, g)."""
     move, law = Move(group), feedback_body(group, u, reads)
-    data, size = WeiNormanData(group), group.dim * (2 if reads == "g" else 1)
+    data, size = derivation_of(group).wei_norman, group.dim * (2 if reads == "g" else 1)
 
     def body(ops: Arithmetic, X: Vector, y: Vector, t: Scalar, eps: Scalar) -> tuple[Any, ...]:
         def rates(time: Scalar, elements: list[Any], g: Vector) -> tuple[list[Vector], Vector]:
@@ -255,7 +255,7 @@ def _alone(
     group: MatrixGroup, function: Callable[..., Any], reads: str, times: Array, eps: float, X0: Array, g0: Array,
     rtol: float, atol: float, where: str,
 ) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
-    n, ops, data = group.dim, FloatArithmetic(), WeiNormanData(group)
+    n, ops, data = group.dim, FloatArithmetic(), derivation_of(group).wei_norman
     exp, reach = logarithms(group).exp, min(1.0, reach_of(group, closed=True)) / 2
     scale = np.full(n + len(g0), max(atol, rtol * 1e-3))
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from itertools import accumulate
 from typing import Any
 
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -29,7 +29,7 @@ class Move:
 
     def __init__(self, group: MatrixGroup) -> None:
         self.group = group
-        self.derivation = GroupDerivation(group)
+        self.derivation = derivation_of(group)
 
     def __call__(self, ops: Arithmetic, X: Any, theta: Vector) -> Any:
         if self.derivation.matrix_pattern is None:

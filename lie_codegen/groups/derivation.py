@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -135,3 +135,9 @@ class GroupDerivation:
         from lie_codegen.exact.invariant_form import entry_relation, matrix_relation
 
         return matrix_relation(self.ads) or entry_relation(killing_form(self.group.algebra))
+
+
+@lru_cache(maxsize=64)
+def derivation_of(group: MatrixGroup) -> GroupDerivation:
+    """The exact data of a group, one for all who ask: what was derived for one kernel is there for the next."""
+    return GroupDerivation(group)

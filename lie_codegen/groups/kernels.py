@@ -17,12 +17,11 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from typing import Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import log_coordinates
@@ -73,12 +72,7 @@ def group_kernel(group: MatrixGroup, name: str) -> Kernel:
     """
     if name not in _MAKERS:
         raise InputError(f"no kernel {name!r} of a group; there are {', '.join(KERNEL_NAMES)}")
-    return _MAKERS[name](_derivation(group))
-
-
-@lru_cache(maxsize=32)
-def _derivation(group: MatrixGroup) -> GroupDerivation:
-    return GroupDerivation(group)
+    return _MAKERS[name](derivation_of(group))
 
 
 def _product_exp(data: GroupDerivation) -> Kernel:

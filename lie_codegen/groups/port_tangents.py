@@ -12,7 +12,7 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.catalogue_load import group as named_group
 from lie_codegen.groups.catalogue_names import group_names
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.admission import NEAR_GROUP
 from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -52,7 +52,7 @@ def acting_group(kernel: Kernel, place: int, given: Any, tangent: str) -> Matrix
     # Only a kernel that says what it admits can tell an element from another matrix, as an inertia, of the same shape.
     if kernel.sampler is not None:
         sample = kernel.sample(random.Random(0))[place]
-        if not defect(FloatArithmetic(), GroupDerivation(group), sample) < NEAR_GROUP:
+        if not defect(FloatArithmetic(), derivation_of(group), sample) < NEAR_GROUP:
             raise InputError(
                 f"{port.name} of {kernel.symbol} is no element of {group.name}, so that tangent={tangent!r} has no "
                 'meaning; give group=, or tangent="entries"'

@@ -15,7 +15,7 @@ from typing import Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices, real_rows
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.port_tangents import acting_group, derivative_rows, entry_rates, group_rates, moving
@@ -186,7 +186,7 @@ def _values(dual: DualArithmetic, port: Port, value: Any) -> Any:
 
 def _in_algebra(ops: Arithmetic, group: MatrixGroup, X: Any, slopes: Matrix, tangent: str) -> Matrix:
     """(n, columns): the v_j with T_j = X hat(v_j) or hat(v_j) X, T_j the derivative of X along the j-th tangent."""
-    algebra = GroupMatrices(ops, GroupDerivation(group).real)
+    algebra = GroupMatrices(ops, derivation_of(group).real)
     element = algebra.read(X)
     inverse = algebra.inverse(element)
     d = group.degree

@@ -10,12 +10,12 @@ import random
 from typing import Any
 
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star, dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
@@ -70,7 +70,7 @@ def driven_step(group: GroupLike, degree: int = TAYLOR_DEGREE, name: str = "driv
         theta, change = driven_increments(group, ops, xi, J, inverse, f0, fm, f1, h)
         return ([*pack(group, times_taylor_exp(group, ops, X, theta, degree)), *plus(xi, change)],)
 
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         def vector() -> Vector:

@@ -8,11 +8,10 @@ from typing import Any
 
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.groups.units import force_units
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star
 from lie_codegen.kernel.definition import kernel_factory
@@ -73,7 +72,7 @@ def spatial_momentum_kernel(group: GroupLike, inertia: Any, name: str = "spatial
     """
     group = as_group(group, "spatial_momentum_kernel")
     metric = positive_matrix(inertia, group.dim, "inertia")
-    real, data = RealMatrices(group), WeiNormanData(group)
+    real, data = derivation_of(group).real, derivation_of(group).wei_norman
 
     def body(ops: Arithmetic, X: Any, xi: Vector) -> tuple[Any, ...]:
         matrices = GroupMatrices(ops, real)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from typing import Any
 
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import matrix_port, random_element
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import double, kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
@@ -129,7 +129,7 @@ def reconstruct_kernel(fields: MechanicalFields, *, back: bool) -> Kernel:
     """(X, xi, advected.., tau, eps) -> (X_next, xi_next): the actual state of an averaged one, or back."""
     system, n, group = fields.system, fields.system.dim, fields.system.group
     name = "estimate" if back else "reconstruct"
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
 
     def body(ops: Arithmetic, X: Any, *arguments: Any) -> tuple[Any, ...]:
         *parts, tau, eps = arguments
@@ -162,7 +162,7 @@ def reconstruct_kernel(fields: MechanicalFields, *, back: bool) -> Kernel:
 
 def _step(system: MechanicalSystem, name: str, ports: tuple[Port, ...], body: Any, what: str) -> Kernel:
     group = system.group
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
     extent = packed_size(group) + len(system.symbols)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:

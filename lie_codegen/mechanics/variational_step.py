@@ -18,10 +18,10 @@ from typing import Any
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.matrix_pattern import RealMatrices
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import solve
 from lie_codegen.kernel.definition import kernel_factory
@@ -67,7 +67,7 @@ def variational_step(
     """
     group = as_group(group, "variational_step")
     metric = positive_matrix(inertia, group.dim, "inertia")
-    real = RealMatrices(group)
+    real = derivation_of(group).real
     check_cayley(real)
     size = packed_size(group)
 
@@ -84,7 +84,7 @@ def variational_step(
         raised = matvec(constant_matrix(ops, metric.inv()), arrived)
         return [*pack(group, X), *arrived], dot(raised, arrived) / 2
 
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         momentum = [rng.uniform(-1, 1) for _ in range(group.dim)]

@@ -17,9 +17,9 @@ from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import eigenvalues, symmetric_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.linear import Vector, constant_matrix, identity, matvec, negative
 
@@ -34,7 +34,7 @@ class Potential:
             ExpressionError, InputError: outside the grammar; an entry of X_d, which a potential does not know.
         """
         self.group = group
-        self.real = RealMatrices(group)
+        self.real = derivation_of(group).real
         self.data = refuse_inputs(error_function(group, V, parameters=parameters, name="potential"))
         own = {s for prefix in ("X", "Xi") for s in ErrorSymbols(group).matrix(prefix).free_symbols}
         foreign = self.data.phi.free_symbols - own

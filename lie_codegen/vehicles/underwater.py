@@ -22,9 +22,9 @@ from lie_codegen.control.second_order_step import ForceBody
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import eigenvalues, positive_matrix, real_number, symmetric_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star
 from lie_codegen.kernel.definition import kernel_factory, record_factory
@@ -223,7 +223,7 @@ def compensated(law: Kernel, vehicle: UnderwaterVehicle, name: str | None = None
 
 
 def _sample(group: MatrixGroup, rng: random.Random) -> tuple[Any, ...]:
-    return random_element(group, WeiNormanData(group), rng), [rng.uniform(-1, 1) for _ in range(6)]
+    return random_element(group, derivation_of(group).wei_norman, rng), [rng.uniform(-1, 1) for _ in range(6)]
 
 
 def _forces(

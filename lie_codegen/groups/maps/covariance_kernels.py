@@ -19,7 +19,7 @@ from typing import Any, Literal
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.kernels import group_kernel
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import log_coordinates
@@ -56,7 +56,7 @@ def covariance_kernels(
     """
     if order not in (2, 4):
         raise InputError(f"covariance_kernels: order is 2 or 4, given {order!r}")
-    data = GroupDerivation(as_group(group))
+    data = derivation_of(as_group(group))
     kernels = (_compound(data, order), _inverse(data), _flow(data), _mean_term(data), _fuse_term(data))
     return in_namespace(kernels, name)
 

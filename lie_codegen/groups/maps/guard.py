@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.admission import NEAR_GROUP
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -23,7 +23,7 @@ def nan_off_group(kernel: Kernel, group: MatrixGroup, ports: Iterable[str]) -> K
     """
     names = [port.name for port in kernel.inputs]
     places = [names.index(name) for name in ports]
-    data, inner = GroupDerivation(group), kernel.body
+    data, inner = derivation_of(group), kernel.body
 
     def body(ops: Arithmetic, *arguments: Any) -> tuple[Any, ...]:
         from lie_codegen.groups.maps.defect import defect

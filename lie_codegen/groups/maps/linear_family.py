@@ -66,7 +66,8 @@ class LinearFamily:
                 for i, a in entry.items():
                     for k, b in other.items():
                         key = (min(i, k), max(i, k))
-                        polynomial[key] = sp.expand(polynomial.get(key, 0) + a * b)
+                        total = polynomial.get(key, 0) + a * b
+                        polynomial[key] = total if total.is_Rational else sp.expand(total)
         result = {}
         for r, polynomial in squares.items():
             left = {key: value for key, value in polynomial.items() if value != 0}
@@ -118,7 +119,8 @@ class LinearFamily:
             # One common factor is taken out: (a^2 + b^2) / 4 rather than a^2 / 4 + b^2 / 4.
             scale = key[0][1]
             for m, value in key:
-                ratio = sp.radsimp(value / scale)
+                ratio = value / scale
+                ratio = ratio if ratio.is_Rational else sp.radsimp(ratio)
                 term = self._monomial(m)
                 if ratio == -1 and not is_zero(total):
                     total = total - term

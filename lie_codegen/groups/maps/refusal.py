@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.defect import Figure, figures_of
 from lie_codegen.groups.maps.nearest import nearest
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -35,7 +34,7 @@ def why_refused(group: MatrixGroup, matrix: Array, defect: Callable[[Array], flo
     entries: Any = matrix.tolist()
     if group.is_complex:
         entries = [[Complex(z.real, z.imag) for z in row] for row in entries]
-    figures: list[Figure] = figures_of(FloatArithmetic(), _derivation(group), entries)
+    figures: list[Figure] = figures_of(FloatArithmetic(), derivation_of(group), entries)
     name, _, plain = max(figures, key=lambda figure: figure[1])
     worst = f"{name} = {_number(plain)}"
     phase = _phase(group, matrix, determinant, defect)
@@ -65,8 +64,3 @@ def _phase(group: MatrixGroup, matrix: Array, determinant: complex, defect: Call
         f"the matrix is unitary and a phase takes it there: X exp({angle:.10g}j), or this times exp(2 pi i k / {d}); "
         "lc.UpToPhase(X) lets a steering task choose"
     )
-
-
-@lru_cache(maxsize=64)
-def _derivation(group: MatrixGroup) -> GroupDerivation:
-    return GroupDerivation(group)

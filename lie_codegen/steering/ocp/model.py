@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
 from lie_codegen.groups.maps.log_routine import vee
@@ -29,7 +30,7 @@ from lie_codegen.kernel.linear import matmul
 from lie_codegen.on_demand import casadi as ca
 from lie_codegen.steering.ocp.model_sizes import Model, Sizes
 from lie_codegen.steering.ocp.problem_data import ProblemData, total_square
-from lie_codegen.steering.ocp.terms import Point, derivation
+from lie_codegen.steering.ocp.terms import Point
 
 _OPS = CasadiArithmetic()
 #: Terms of the series of J_r' lambda: to 1e-12 for |ad theta| <= 1, and curvature alone depends on it.
@@ -42,7 +43,7 @@ class ModelBuilder:
     def __init__(self, data: ProblemData) -> None:
         self.data = data
         self.group = data.group
-        self.exact = derivation(data.group)
+        self.exact = derivation_of(data.group)
         n, q, m = data.group.dim, data.states.size, data.inputs.size
         self.n, self.q, self.m = n, q, m
         self.size = packed_size(data.group)

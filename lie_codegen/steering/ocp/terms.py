@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.errors import ExpressionError, InputError, ShapeError
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -153,7 +153,7 @@ def _random_values(group: MatrixGroup, each: Layout, rng: random.Random) -> list
 
 def _random_element(group: MatrixGroup, rng: random.Random) -> Any:
     g = [rng.uniform(-1, 1) for _ in group.labels]
-    return product_exp(FloatArithmetic(), derivation(group).wei_norman, g)
+    return product_exp(FloatArithmetic(), derivation_of(group).wei_norman, g)
 
 
 def check_ports(scope: Scope, kernel: Kernel, where: str) -> None:
@@ -266,7 +266,7 @@ def _evaluated(scope: Scope, expressions: Sequence[sp.Expr], at: Point) -> list[
     elements = {"X": at.X}
     for name, owner in (("Xi", "X"), ("Xdi", "Xd")):
         if any(str(symbol) in used for entry in _element(group, name).flat() for symbol in entry.free_symbols):
-            matrices = GroupMatrices(at.ops, derivation(group).real)
+            matrices = GroupMatrices(at.ops, derivation_of(group).real)
             element = at.X if owner == "X" else _named_element(scope, owner, at)
             elements[name] = matrices.write(matrices.inverse(matrices.read(element)))
     for name, element in elements.items():
@@ -297,9 +297,3 @@ def _named_element(scope: Scope, name: str, at: Point) -> Any:
                 entries = [Complex(re, im) for re, im in zip(entries[::2], entries[1::2], strict=True)]
             return _nested(entries, (scope.group.degree, scope.group.degree))
     raise InputError(f"ocp: no parameter {name}")
-
-
-@lru_cache(maxsize=32)
-def derivation(group: MatrixGroup) -> GroupDerivation:
-    """The exact data of a group, derived once."""
-    return GroupDerivation(group)

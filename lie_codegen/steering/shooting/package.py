@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from lie_codegen.algebra.controllability import require_controllable
 from lie_codegen.codegen.opcodes import c_literal
 from lie_codegen.codegen.templates import render
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import product_exp
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel
@@ -132,7 +132,7 @@ def _endpoint(kernel: Kernel, view: SteeringView, mu0: Sequence[float]) -> list[
 def _example(group: MatrixGroup) -> list[str]:
     """Phi(0.1, 0.05, pi/40, 0.1, ...): on SO(3) the satellite manoeuvre of TR 93-59, section 5.2."""
     g = [_EXAMPLE[k % len(_EXAMPLE)] for k in range(group.dim)]
-    matrix = product_exp(FloatArithmetic(), WeiNormanData(group), g)
+    matrix = product_exp(FloatArithmetic(), derivation_of(group).wei_norman, g)
     entries = [Complex.of(entry) for row in matrix for entry in row]
     numbers = [part for entry in entries for part in ((entry.re, entry.im) if group.is_complex else (entry.re,))]
     return [c_literal(float(value)) for value in numbers]

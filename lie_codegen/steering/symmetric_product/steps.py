@@ -6,11 +6,11 @@ import random
 from functools import lru_cache
 from typing import Any
 
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import random_element
 from lie_codegen.groups.maps.rkmk import TAYLOR_DEGREE, times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import ad_star, dexp_inverse
 from lie_codegen.kernel.definition import kernel_factory
@@ -76,7 +76,7 @@ def oscillation_step(group: MatrixGroup, forces: int) -> Kernel:
         total = increment(vectors(ops), CLASSICAL, slope, [0] * (2 * n), step)
         return ([*pack(group, times_taylor_exp(group, ops, X, total[:n], TAYLOR_DEGREE)), *plus(w, total[n:])],)
 
-    data = WeiNormanData(group)
+    data = derivation_of(group).wei_norman
     square = (n, n)
     inputs = (
         Port("state", (size + n,), description="varying entries of X, then w"), Port("numbers", (2 * n,)), Port("balance", (max(1, len(pairs)),)),

@@ -18,7 +18,7 @@ from typing import Any
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import GroupDerivation
+from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.maps.rkmk import times_taylor_exp
@@ -42,7 +42,7 @@ class Body:
 
     def __init__(self, ops: Arithmetic, group: MatrixGroup, frame: sp.MatrixBase, wheels: MomentumWheels) -> None:
         self.ops, self.group = ops, group
-        self.algebra = GroupMatrices(ops, GroupDerivation(group).real)
+        self.algebra = GroupMatrices(ops, derivation_of(group).real)
         locked, axes, axial = sp.Matrix(wheels.locked_inertia), sp.Matrix(wheels.axes), sp.diag(*wheels.axial)
         floating = (locked - axes.T * axial * axes).applyfunc(sp.radsimp)
         self.locked_inverse = constant_matrix(ops, locked.inv())
