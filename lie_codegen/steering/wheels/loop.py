@@ -161,15 +161,15 @@ def closed_loop_of(
     step = build(kernel).wheel_loop_step
     starts, many = _starts(system, X0, speeds0, runs)
     count = every * (len(times) - 1)
-    noises = _noise(noise, seed, len(starts), count)
+    noises: dict[str, Any] = _noise(noise, seed, len(starts), count)
     desired = _desired(system, target, reference, times[0] + h * np.arange(count + 1))
     big = 1e300
-    fixed = {
+    fixed: dict[str, Any] = {
         "stored": system.stored,
         "torque_limits": np.full(system.count, big) if system.torque_limits is None else system.torque_limits,
         "speed_limits": np.full(system.count, big) if system.speed_limits is None else system.speed_limits,
     }
-    along = {name: values[:-1][None] if tracks else values for name, values in desired.items()}
+    along: dict[str, Any] = {name: values[:-1][None] if tracks else values for name, values in desired.items()}
     states = step.scan_batch(starts, n=count, every=every, threads=threads, h=h, **fixed, **along, **noises)
     X, omega, speeds = opened(system, states)
     torques = _torques(step, states, {**fixed, **desired}, noises, every, h, tracks)
