@@ -1307,18 +1307,19 @@ int OCP_(step)(workspace *w, const real *X, const real *z, const real *p, ptrdif
                 real held;
                 place_first(w, measured, 0, change);
                 held = forward(&s, 0);
+                w->status = round == 0 ? OCP_HELD : w->status;
+                shift = largest(10 * shift, FIRST_SHIFT); /* the next sweep tries a shorter step, not the same one again */
                 if (is_finite(held)) {
                     take_new(w);
-                } else {
-                    copy(w->x[0], measured, NS);
-                    copy(w->u[0], first, OCP_M);
+                    continue;
                 }
-                w->status = round == 0 ? OCP_HELD : w->status;
-                shift = largest(10 * shift, FIRST_SHIFT); /* the next sample tries a shorter step, not the same one again */
+                copy(w->x[0], measured, NS);
+                copy(w->u[0], first, OCP_M);
                 break;
             }
         }
         take_new(w);
+        w->status = OCP_OK;
 #if OCP_FREE
         measured[NS - 1] = w->x[0][NS - 1];
 #endif

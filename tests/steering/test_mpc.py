@@ -339,6 +339,36 @@ def test_without_a_compiler_numpy_controls(monkeypatch: pytest.MonkeyPatch) -> N
     assert twin.violation == pytest.approx(compiled.violation, abs=1e-9)
 
 
+def test_sweeps_go_on_where_one_found_nothing_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gauss-Newton does not see how the ball of the controls bends: its step is too long, and the next one is damped."""
+    problem = lc.ocp(
+        SO3, controls=SO3.labels, duration=1.5, intervals=10, stage_cost="0.1*norm2(u) + norm2(X - Xd)",
+        terminal_cost="5*norm2(X - Xd)", parameters={"Xd": "X"}, constraints="norm2(u) <= 1", name="so3_ball",
+    )  # fmt: skip
+    machine = InterpretedMachine(problem.data, ModelBuilder(problem.data).build(second_order=False))
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        Xd, X = rotation(rng.normal(size=3)), rotation(0.2 * rng.normal(size=3))
+        plan = problem.solve(Xd=Xd)
+        best = problem.solve(X, Xd=Xd, guess=plan)
+        errors = []
+        for sweeps in (1, 100):
+            controller = lc.mpc(problem, iterations=sweeps)
+            controller.reset(plan)
+            errors.append(float(np.abs(controller.step(X) - best.u[0]).max()))
+        assert controller.status == "ok"
+        assert controller.violation < 1e-3
+        assert errors[0] > 0.1  # one sweep is stuck
+        assert errors[1] < 1e-3  # of the order of 1 / penalty
+    few = lc.mpc(problem, iterations=6)
+    few.reset(plan)
+    monkeypatch.setattr(import_module("lie_codegen.steering.ocp.controller"), "loop_machine", lambda data: machine)
+    twin = lc.mpc(problem, iterations=6)
+    twin.reset(plan)
+    np.testing.assert_allclose(twin.step(X), few.step(X), atol=1e-8)
+    assert twin.status == few.status
+
+
 def package(controller: Any, folder: Path, real: str = "double") -> Path:
     return lc.generate(controller, folder / "package", real=real)
 

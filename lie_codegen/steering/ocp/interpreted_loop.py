@@ -65,11 +65,12 @@ class InterpretedLoop(InterpretedSweep):
                 held = self._forward(run, 0.0)
                 if np.isfinite(held):
                     self._take_new(run)
-                else:
-                    w["u"][0] = w["u"][0] + w["K"][0] @ d
-                    w["x"][0] = measured
+                    continue  # the next sweep, from the plan fed back, tries a shorter step
+                w["u"][0] = w["u"][0] + w["K"][0] @ d
+                w["x"][0] = measured
                 break
             self._take_new(run)
+            status = OK
             measured = measured + taken * change
             length, shift = taken, 0.0 if 0.3 * shift < 1e-5 else 0.3 * shift
         w["shift"] = shift

@@ -23,7 +23,8 @@ def mpc(
     Args:
         problem: from `lc.ocp`; a sample is one of its intervals. Where its duration is free, what is left of it is chosen anew at every
             sample, down to the shortest; then the horizon keeps that length.
-        iterations: sweeps a sample; one is enough where samples are short (real-time iteration).
+        iterations: sweeps a sample; one is enough where samples are short (real-time iteration). After one that finds nothing
+            better the next is damped; the multipliers follow once a sample.
         penalty: rho of the conditions.
         sample: seconds between two steps of a problem of free duration; its shortest interval if not given.
 
