@@ -95,7 +95,6 @@ def test_more_periods_are_more_accurate_and_cost_more() -> None:
         ((0.1, 0.1, 0.1), ("w1", "w2"), {"duration": np.inf}, SteeringInputError),
         ((0.1, 0.1, 0.1), ("w1", "w2"), {"method": "four_phase", "q": 0}, SteeringInputError),
         ((0.1, 0.1, 0.1), ("w1", "w2"), {"method": "four_phase", "q": 1.5}, SteeringInputError),
-        ((0.1, 0.0, 0.1), ("w1", "w2"), {"method": "four_phase"}, SteeringInputError),
         ((0.1, 0.1, 0.1), ("w1", "w2", "w3"), {"method": "four_phase"}, SteeringInputError),
         ((0.1, 0.1, 0.1), ("w1", "w2"), {"method": "optimal", "intervalls": 9}, SteeringInputError),
     ],
