@@ -36,9 +36,8 @@ from typing import Any
 
 import numpy as np
 
-from lie_codegen import averaging, control, flow, signals, steering
+from lie_codegen import averaging, control, flow, signals, steering, studies
 from lie_codegen.errors import InputError
-from lie_codegen.studies import distributions
 from lie_codegen.studies.result import Study
 from lie_codegen.studies.stopping import Quantile
 from lie_codegen.studies.study import open_study, study
@@ -150,7 +149,7 @@ def _space(where: str, table: Mapping[str, Any]) -> dict[str, Any]:
         arguments = {key: each for key, each in value.items() if key != "distribution"}
         if kind in ("Sobol", "LatinHypercube") and "low" in arguments:
             arguments["of"] = arguments.pop("low")
-        found[name] = _called(f"{where}.{name}", getattr(distributions, kind), arguments)
+        found[name] = _called(f"{where}.{name}", getattr(studies, kind), arguments)
     return found
 
 

@@ -240,7 +240,7 @@ def test_a_loop_needs_a_group_and_a_law_what_it_reads() -> None:
     with pytest.raises(InputError, match="no group"):
         lc.closed_loop(t=T)
     with pytest.raises(InputError, match="give inertia="):
-        lc.closed_loop("so3", law=law(), t=T)
+        lc.closed_loop("so3", law=lc.attitude_law("pd", inertia="input", k_p=4, k_d=6), t=T)
     with pytest.raises(InputError, match="xi0 is given"):
         lc.closed_loop("so3", law=lc.attitude_law("p"), xi0=OMEGA, t=T)
     assert lc.closed_loop(law=lc.attitude_law("p"), X0=START, t=T) == lc.closed_loop(
