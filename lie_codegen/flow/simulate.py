@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +29,6 @@ METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)
 _DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
-@runtime_checkable
 class Simulated(Protocol):
     """What knows its own system, as a plan does."""
 
@@ -92,12 +91,12 @@ def simulate(
         "t": t, "eps": eps, "X0": X0, "rtol": rtol, "atol": atol, "tolerance": tolerance, "resolution": resolution,
         "method": method, "steps": steps, "events": events, "threads": threads,
     }  # fmt: skip
-    if isinstance(group, Simulated):
+    if _is_simulated(group):
         if u is not None:
             raise InputError("simulate: a plan comes alone, or after its group")
         return group.__simulate__(None, **options)
-    group = as_group(group, "simulate")
-    if isinstance(u, Simulated):
+    group = as_group(cast("GroupLike", group), "simulate")
+    if _is_simulated(u):
         return u.__simulate__(group, **options)
     if u is None or t is None:
         raise InputError(f"simulate({group.name}): give {'an input u' if u is None else 'the times t'}")
@@ -252,6 +251,11 @@ def _check_trajectories(group: MatrixGroup, start: Array, eps: Array, u: Signal)
     if len(set(counts.values())) > 1:
         text = ", ".join(f"{name} has {count}" for name, count in counts.items())
         raise ShapeError(f"simulate({group.name}): give one number of trajectories; {text}")
+
+
+def _is_simulated(what: Any) -> TypeGuard[Simulated]:
+    """By its class: to ask a protocol takes ten microseconds of a call of a hundred."""
+    return hasattr(type(what), "__simulate__")
 
 
 def check_times(group: MatrixGroup, t: ArrayLike) -> Array:

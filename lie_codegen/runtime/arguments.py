@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,12 @@ DTYPES: dict[str, tuple[np.dtype[Any], np.dtype[Any]]] = {
 def dtype_of(port: Port, real: str = "double") -> np.dtype[Any]:
     """float64 or complex128; in floats float32 or complex64."""
     return DTYPES[real][port.is_complex]
+
+
+@lru_cache(maxsize=256)
+def named_results(name: str, fields: tuple[str, ...]) -> Any:
+    """The class of a call's results; to make one takes longer than most kernels."""
+    return namedtuple(name, fields)
 
 
 def bind(signature: Signature, args: Sequence[Any], named: Mapping[str, Any]) -> list[Any]:
@@ -65,6 +73,8 @@ def as_array(kernel: str, port: Port, value: Any, real: str = "double") -> Array
         raise ShapeError(f"{kernel}: {port.name} is real, {describe(port)}; complex numbers were given")
     if array.dtype.kind not in "biufc":
         raise ShapeError(f"{kernel}: {port.name} takes numbers, {describe(port)}; given {type(value).__name__}")
+    if real == "double":
+        return np.require(array, dtype=wanted, requirements=["C", "A"]).reshape(array.shape)
     try:
         with np.errstate(over="raise"):
             return np.require(array, dtype=wanted, requirements=["C", "A"]).reshape(array.shape)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Mapping
 from contextlib import nullcontext
 from functools import cached_property
@@ -18,7 +17,17 @@ from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.plain_data import Definition, makes_records
-from lie_codegen.runtime.arguments import DTYPES, bind, checked, describe, dtype_of, outputs_for, sequences, unshared
+from lie_codegen.runtime.arguments import (
+    DTYPES,
+    bind,
+    checked,
+    describe,
+    dtype_of,
+    named_results,
+    outputs_for,
+    sequences,
+    unshared,
+)
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.patience import progress
 from lie_codegen.runtime.scans import check_loop, scan, scan_batch, scan_reduced
@@ -59,8 +68,8 @@ class Compiled(Generic[Result]):
         self.__doc__ = documentation(signature)
         self.signature = signature
         self.backend = backend
-        fields = [python_field(port.name) for port in signature.outputs]
-        self.result_type: Any = namedtuple(f"{signature.name}_result", fields) if len(fields) > 1 else None
+        fields = tuple(python_field(port.name) for port in signature.outputs)
+        self.result_type: Any = named_results(f"{signature.name}_result", fields) if len(fields) > 1 else None
         self._scalar = not signature.outputs[0].shape
 
     @property

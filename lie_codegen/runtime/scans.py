@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +13,7 @@ from lie_codegen.codegen.signature import Signature, is_step, python_field
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.kernel import Port
-from lie_codegen.runtime.arguments import bind, checked, dtype_of, outputs_for, sequences, unshared
+from lie_codegen.runtime.arguments import bind, checked, dtype_of, named_results, outputs_for, sequences, unshared
 from lie_codegen.runtime.arguments_scan import Strides, loops
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.patience import progress
@@ -51,6 +49,12 @@ def check_loop(step: Step, form: str, n: Any, every: Any) -> None:
         raise InputError(f"{step.name}.{form}: n = {n} is no multiple of every = {every}")
 
 
+def _of_states(step: Step) -> Signature:
+    """The signature of what a loop returns; `dataclasses.replace` takes as long as a short loop."""
+    whole = step.signature
+    return Signature(whole.name, whole.symbol, whole.inputs, whole.outputs[:1], real=whole.real)
+
+
 def scan(step: Step, args: Sequence[Any], named: Mapping[str, Any], n: int, every: int, out: Any) -> Array:
     """`Compiled.scan`."""
     check_loop(step, "scan", n, every)
@@ -59,8 +63,7 @@ def scan(step: Step, args: Sequence[Any], named: Mapping[str, Any], n: int, ever
     arrays, strides, count = sequences(step.signature, rest, "steps", step.inputs[1:])
     if count is not None and count != n:
         raise ShapeError(f"{step.name}.scan: inputs have {count} steps, n = {n}")
-    only = replace(step.signature, outputs=step.outputs[:1])
-    (trajectory,) = outputs_for(only, out, (int(n) // int(every) + 1,))
+    (trajectory,) = outputs_for(_of_states(step), out, (int(n) // int(every) + 1,))
     arrays = [state, *arrays]
     if out is not None:
         arrays = unshared(arrays, [trajectory])
@@ -89,7 +92,7 @@ def scan_batch(
     check_loop(step, "scan_batch", n, every)
     arrays, strides, count = loops(step.signature, bind(step.signature, args, named), int(n))
     port = step.outputs[0]
-    (trajectories,) = outputs_for(replace(step.signature, outputs=(port,)), out, (count, int(n) // int(every) + 1))
+    (trajectories,) = outputs_for(_of_states(step), out, (count, int(n) // int(every) + 1))
     if out is not None:
         arrays = unshared(arrays, [trajectories])
 
@@ -122,7 +125,9 @@ def scan_reduced(
     how = list(_ways(step, reduce))
     if len(how) == 1:  # a step that tells nothing beside its state: its loop with no other state stored
         states = scan_batch(step, args, named, n, int(n) or 1, None, threads)[:, -1]
-        return namedtuple(f"{step.name}_reduced", [python_field(step.outputs[0].name)])(np.ascontiguousarray(states))
+        return named_results(f"{step.name}_reduced", (python_field(step.outputs[0].name),))(
+            np.ascontiguousarray(states)
+        )
     arrays, strides, count = loops(step.signature, bind(step.signature, args, named), int(n))
     port, real = step.outputs[0], step.signature.real
     states = np.empty((count, *port.shape), dtype_of(port, real))
@@ -145,8 +150,8 @@ def scan_reduced(
 
     with progress("scan_batch") if count * int(n) > CALLS else nullcontext():
         in_parts(some, count, threads, int(n))
-    fields = [python_field(step.outputs[k].name) for k in (0, *kept)]
-    return namedtuple(f"{step.name}_reduced", fields)(states, *kept.values())
+    fields = tuple(python_field(step.outputs[k].name) for k in (0, *kept))
+    return named_results(f"{step.name}_reduced", fields)(states, *kept.values())
 
 
 def _ways(step: Step, reduce: Mapping[str, str]) -> Iterator[int]:
