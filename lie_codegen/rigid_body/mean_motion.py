@@ -86,13 +86,17 @@ def mean_motion(model: TumblingBody, free: FreeRotation, t: Array, wishes: Wishe
     return run
 
 
+def squared_modulus(inertia: Array, square: Any, D: Any) -> Any:
+    """k^2 of motions with L^2 = `square` and D = L^2 - 2 I3 T, about axes with these moments (18); outside [0, 1) there is none."""
+    I1, I2, I3 = inertia.tolist()
+    return (I1 - I2) * I3 * D / ((I2 - I3) * (square * (I1 - I3) - I1 * D))
+
+
 def modulus(axes: BodyAxes, y: Array) -> Array:
     """(n,) k of mean states (n, 6); NaN where there is no such motion."""
-    I1, I2, I3 = axes.inertia.tolist()
     square = np.einsum("ij,ij->i", y[:, :3], y[:, :3])
-    D = y[:, 3]
     with np.errstate(invalid="ignore", divide="ignore"):
-        k: Array = np.sqrt((I1 - I2) * I3 * D / ((I2 - I3) * (square * (I1 - I3) - I1 * D)))
+        k: Array = np.sqrt(squared_modulus(axes.inertia, square, y[:, 3]))
     return k + 0.0  # no negative zero at pure spin
 
 

@@ -20,6 +20,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.routine import call_routine
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.relative_equilibria import NewtonMethod
+from lie_codegen.rigid_body.mean_motion import squared_modulus
 from lie_codegen.rigid_body.torque_model import TorqueModel
 from lie_codegen.rigid_body.torques import Torque
 from lie_codegen.rigid_body.tumbling_routines import average_routine
@@ -123,8 +124,7 @@ def equilibrium_of(
     H, D = found[:3] * scale[:3], float(found[3] * scale[3])
     square = float(H @ H)
     energy = (square - D) / (2 * inertia[2])
-    I1, I2, I3 = inertia.tolist()
-    k2 = (I1 - I2) * I3 * D / ((I2 - I3) * (square * (I1 - I3) - I1 * D))
+    k2 = squared_modulus(inertia, square, D)
     if not 0 < k2 < 1:
         raise ComputationError(
             f"tumbling_average: Newton's method left the tumbling motions (k^2 = {k2:.4g}); start nearer"

@@ -74,12 +74,12 @@ def body_velocities(plan: Plan, t: Array) -> Array:
         flown = simulated(plan, t=knots)
         if isinstance(flown, Replay) and flown.xi is not None:
             return np.asarray(flown.xi[place[1:]])
-        X, a = flown.X[place[1:]], np.asarray(_velocity(plan)(t))
+        X, a = flown.X[place[1:]], np.asarray(velocity_of(plan)(t))
         return plan.group.project(np.linalg.solve(X, np.tensordot(a, plan.group.basis, 1)) @ X)
-    return np.asarray(_velocity(plan)(t))
+    return np.asarray(velocity_of(plan)(t))
 
 
-def _velocity(plan: Plan) -> Controls:
+def velocity_of(plan: Plan) -> Controls:
     """The velocity that the controls and the drift make, on the side that the plan's system says."""
     system, drift = plan.details.get("system"), plan.details.get("drift")
     if system is not None:
@@ -114,7 +114,7 @@ def simulated(
     details = plan.details
     system = details.get("system")
     if details.get("inertia") is None and (system is None or not system.right):
-        velocity = _velocity(plan)
+        velocity = velocity_of(plan)
         start = _start(plan) if system is None else system.start
         if X0 is None and times[0] > 0:
             X0 = simulate(group, velocity, t=[0.0, times[0]], X0=start).X[-1]
@@ -155,7 +155,7 @@ def _replayed(plan: Plan, times: Array, X0: Array | None, rtol: float) -> Replay
     else:
         system: System = details["system"]
         # the inverse of X' = hat(a) X is left-invariant: Y' = -Y hat(a)
-        velocity = _velocity(plan).scaled(-np.ones(plan.group.dim))
+        velocity = velocity_of(plan).scaled(-np.ones(plan.group.dim))
         run = simulate(plan.group, velocity, t=knots, rtol=rtol)
         path, xi, start = np.linalg.inv(run.X), None, system.start
         # the error of an inverse: |dX| = |X dY X|

@@ -9,7 +9,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import MissingDependencyError, SteeringInputError
-from lie_codegen.steering.plan import Plan
+from lie_codegen.steering.plan import Controls, Plan
+from lie_codegen.steering.plan_path import velocity_of
 
 
 def qutip_evolution(plan: Plan) -> tuple[Any, Array]:
@@ -33,7 +34,11 @@ def qutip_evolution(plan: Plan) -> tuple[Any, Array]:
     hat = plan.group.hat
     system, inputs = plan.details.get("system"), plan.details.get("inputs")
     if system is None or inputs is None or not system.steady:
-        parts = [[Qobj(1j * A), _Component(plan, number)] for number, A in enumerate(plan.group.basis)]
+        velocity, forwards = velocity_of(plan), _forwards(plan)
+        parts = [
+            [Qobj(1j * A), _Component(velocity, number, plan.duration, forwards)]
+            for number, A in enumerate(plan.group.basis)
+        ]
         return QobjEvo(parts), np.unique(np.concatenate([np.linspace(0, plan.duration, 101), _breakpoints(plan)]))
     played = inputs if system.right else inputs.reversed()
     stepwise = bool(np.all(played.first == played.last))
@@ -49,16 +54,14 @@ def qutip_evolution(plan: Plan) -> tuple[Any, Array]:
 class _Component:
     """t -> one component of the velocity, drift included, as it is played."""
 
-    plan: Plan
+    velocity: Controls
     number: int
+    duration: float
+    forwards: bool
 
     def __call__(self, t: float) -> float:
-        s = min(max(t if _forwards(self.plan) else self.plan.duration - t, 0.0), self.plan.duration)
-        system = self.plan.details.get("system")
-        drift = self.plan.details.get("drift", np.zeros(self.plan.group.dim))
-        if system is not None:
-            drift = system.drift.at(np.array([s]))[0]
-        return float(self.plan.u(s)[self.number] + drift[self.number])
+        s = min(max(t if self.forwards else self.duration - t, 0.0), self.duration)
+        return float(self.velocity(s)[self.number])
 
 
 def _forwards(plan: Plan) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class Scene:
     obstacles: tuple[Obstacle, ...]
     settings: Settings
 
-    @property
+    @cached_property
     def discs(self) -> Discs | None:
         """The obstacles as discs, where all of them are."""
         return (
@@ -120,8 +121,8 @@ class Scene:
         task = self.task
         speed = 4.0 / task.duration  # steps follow the flight that corrects; the search needs no more
         programme = linear_pieces(task, pieces, speed)
-        first = sum(len(side) > 0 for side in (task.end.before,)) * task.free_slots[0]
-        own = len(programme.slot) - task.free_slots[0] - task.free_slots[1]
+        first, last = task.free_slots
+        own = len(programme.slot) - first - last
         nodes = np.arange(1, own, 2)  # two exponentials make a step
         given = np.zeros(len(self.obstacles)) if margins is None else margins
         goal = task.goal(np.array([variant]))
@@ -208,13 +209,14 @@ class Scene:
             v = shape.ravel()
             X = self.flight(flown)
             gaps = np.min(self.keep_out.gaps(X), axis=0)
-            clearance = -1.0 if tunnels(self.obstacles, X) else float(np.min(gaps))
+            through = tunnels(self.obstacles, X)
+            clearance = -1.0 if through else float(np.min(gaps))
             way = seen(self.keep_out, X[np.linspace(0, len(X) - 1, 129).round().astype(int)])
             cost = flown.inputs.integral_of_squares(task.weights)
             now = Result(flown, variant, cost, clearance, flown.miss, way, name)
             if best is None or min(now.clearance, 0.0) > min(best.clearance, 0.0):
                 best = now
-            if clearance >= -CLEAR or tunnels(self.obstacles, X):
+            if clearance >= -CLEAR or through:
                 break
             margins = margins + np.where(gaps < 0, -_WIDER * gaps + CLEAR, 0.0)
         if best is None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.groups.conventions import rotation_from_quaternion
 from lie_codegen.on_demand import scipy
 from lie_codegen.steering.obstacles.keep_out import KeepOut
 
@@ -197,22 +198,10 @@ def _sampled(space: Space, rng: np.random.Generator) -> Places:
         out /= np.linalg.norm(out, axis=1)[:, None]
         p[::2] = centers[which] + out * (radii[which] * rng.uniform(1.02, 1.6, 2 * _SAMPLES))[:, None]
     w = rng.normal(size=(4 * _SAMPLES, 4))
-    w /= np.linalg.norm(w, axis=1)[:, None]
-    R = _of_quaternions(w)
-    if np.all(keep_out.balls):
-        R = np.tile(np.eye(3), (len(p), 1, 1))
+    alike = bool(np.all(keep_out.balls))  # no attitude is looked at
+    R = np.tile(np.eye(3), (len(p), 1, 1)) if alike else rotation_from_quaternion(w, order="wxyz")
     places = Places(p, R)
     return places.at(np.flatnonzero(space.clear(places))[:_SAMPLES])
-
-
-def _of_quaternions(q: Array) -> Array:
-    w, x, y, z = q.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _roadmap(space: Space, places: Places) -> Any:
