@@ -45,6 +45,14 @@ class Planned(Protocol):
         """(k,) times -> (k, d, d)."""
 
 
+class PlanOnGroup(Planned, Protocol):
+    """A plan that names its group."""
+
+    @property
+    def group(self) -> MatrixGroup:
+        """The group that the path runs on."""
+
+
 @dataclass(frozen=True)
 class _Piece:
     """The body velocity as a polynomial of t between first and last, where it is smooth."""

@@ -32,7 +32,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec
 
 if TYPE_CHECKING:
-    from lie_codegen.control.plan_reference import Planned
+    from lie_codegen.control.plan_reference import Planned, PlanOnGroup
 
 
 @kernel_factory()
@@ -160,7 +160,11 @@ def _times(a: list[list[Any]], b: list[list[Any]]) -> list[list[Any]]:
 
 
 def _space(group: Any) -> Any:
-    return group if isinstance(group, Manifold) else as_group(group, "reference")
+    return group if isinstance(group, Manifold) or _is_plan(group) else as_group(group, "reference")
+
+
+def _is_plan(value: Any) -> bool:
+    return all(hasattr(value, name) for name in ("X", "u", "duration"))
 
 
 @overload
@@ -170,6 +174,12 @@ def reference(group: Manifold, formulas: Sequence[Any]) -> CurveReference: ...
 @overload
 def reference(
     group: GroupLike, formulas: Planned, *, smoothing: float | None = None, tolerance: float = 1e-8
+) -> PlanReference: ...
+
+
+@overload
+def reference(
+    group: PlanOnGroup, *, duration: float | None = None, smoothing: float | None = None, tolerance: float = 1e-8
 ) -> PlanReference: ...
 
 
@@ -191,7 +201,7 @@ def reference(
 
 @record_factory(group=_space, times=doubles, waypoints=doubles, samples=doubles, start=doubles)
 def reference(
-    group: GroupLike | Manifold,
+    group: GroupLike | Manifold | PlanOnGroup,
     formulas: Sequence[Any] | Planned | None = None,
     *,
     plan: Planned | None = None,
@@ -206,7 +216,7 @@ def reference(
     """A reference from formulas of t, from a plan, or from waypoints; its velocity and acceleration are derived.
 
     Args:
-        group: the group; or a manifold, then formulas are its N coordinates.
+        group: the group; or a manifold, then formulas are its N coordinates; or a plan alone, as in `lc.reference(plan)`.
         formulas: (n,) texts or expressions of t: X_d = start exp(g_1(t) A_1) ... exp(g_n(t) A_n). Or the plan
             of a manoeuvre, as `steer` makes it: then the reference says its `error` and what it rounds off (`PlanReference`).
         plan: the same.
@@ -225,7 +235,12 @@ def reference(
     """
     if isinstance(group, Manifold):
         return _on_manifold(group, formulas)
-    group = as_group(group, "reference")
+    if _is_plan(group):
+        if formulas is not None or plan is not None:
+            raise InputError("reference: a plan comes alone, or after its group")
+        formulas = cast("PlanOnGroup", group)
+        group = formulas.group
+    group = as_group(cast("GroupLike", group), "reference")
     if plan is not None:
         if formulas is not None:
             raise InputError("reference: give the plan as plan= or in the place of formulas, not both")
@@ -234,7 +249,7 @@ def reference(
     duration, smoothing = (double(each) if isinstance(each, str) else each for each in (duration, smoothing))
     tolerance = double(tolerance) if isinstance(tolerance, str) else tolerance
     if duration is not None:
-        if not all(hasattr(formulas, name) for name in ("X", "u", "duration")):
+        if not _is_plan(formulas):
             raise InputError("reference: duration= goes with a plan")
         from lie_codegen.control.retimed_plan import retimed
 
@@ -246,7 +261,7 @@ def reference(
         raise InputError(
             f"a reference on {group.name} is given by formulas, by a plan, or by times and waypoints (or times and samples)"
         )
-    if all(hasattr(formulas, name) for name in ("X", "u", "duration")):
+    if _is_plan(formulas):
         if start is not None:
             raise InputError("reference: a plan begins where it begins; start= goes with formulas")
         from lie_codegen.control.plan_reference import plan_reference

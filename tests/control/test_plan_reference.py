@@ -148,6 +148,16 @@ def test_what_cannot_be_flown_is_refused() -> None:
         lc.closed_loop("so3", inertia=INERTIA, law=law, reference=lc.reference("so3", plan), t=np.linspace(0, 5, 11))
 
 
+def test_a_plan_brings_its_group() -> None:
+    plan = lc.steer("so3", TARGET, controls=[0, 1], duration=1.0)
+    alone, after = lc.reference(plan, smoothing=0.05), lc.reference("so3", plan, smoothing=0.05)
+    assert alone == after
+    made = made_from(alone.definition)
+    assert made == alone
+    with pytest.raises(lc.errors.InputError, match="comes alone, or after its group"):
+        lc.reference(plan, plan)
+
+
 def test_its_definition_makes_it_again() -> None:
     """A loop that is known by its definition is given texts: "1/10" for a time, "1/100000000" for the tolerance."""
     plan = lc.steer("so3", (0.1, 0.05, 0.08), ("w1", "w2"), 24.0, method="four_phase")
