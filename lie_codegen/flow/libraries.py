@@ -36,8 +36,8 @@ def logarithms(group: MatrixGroup) -> Library:
     return build(group)
 
 
-#: The methods of `lc.simulate`.
-METHODS = ("rkmk4", "commutator_free")
+#: The methods of fourth order of `lc.simulate`.
+FOURTH_ORDER = ("rkmk4", "commutator_free")
 
 
 def step_of(group: MatrixGroup, method: str) -> Compiled[Any]:
@@ -46,8 +46,8 @@ def step_of(group: MatrixGroup, method: str) -> Compiled[Any]:
     Raises:
         InputError: no such method.
     """
-    if method not in METHODS:
-        raise InputError(f"simulate({group.name}): method is one of {', '.join(METHODS)}; given {method!r}")
+    if method not in FOURTH_ORDER:
+        raise InputError(f"simulate({group.name}): method is one of {', '.join(FOURTH_ORDER)}; given {method!r}")
     return integrators(group).rkmk4_step if method == "rkmk4" else _commutator_free(group).commutator_free_step
 
 

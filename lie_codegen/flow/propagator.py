@@ -19,7 +19,7 @@ from lie_codegen.flow.magnus.solver import LONG, REACHED, WaveRuns
 from lie_codegen.flow.magnus.tangents import tangents
 from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive, wave_numbers
 from lie_codegen.flow.propagation import Power, PropagationBatch
-from lie_codegen.flow.simulate import check_tolerance
+from lie_codegen.flow.simulate_arguments import check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved

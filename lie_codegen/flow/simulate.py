@@ -10,23 +10,30 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.door import warn_caller
-from lie_codegen.errors import InputError, NotFiniteError, ShapeError, SlowWarning
-from lie_codegen.flow.events import Event, EventHits, event_function
-from lie_codegen.flow.events import Function as EventFunction
+from lie_codegen.errors import InputError, ShapeError, SlowWarning
+from lie_codegen.flow.events import Event, EventHits
 from lie_codegen.flow.feedback_law import Feedback, as_feedback
 from lie_codegen.flow.inputs import Signal, as_drive, as_signal, drive_signal
-from lie_codegen.flow.libraries import step_of
-from lie_codegen.flow.magnus.run import MOST_STEPS, MagnusRun, fixed_run, magnus_run, order_for
+from lie_codegen.flow.libraries import FOURTH_ORDER, step_of
+from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.flow.magnus.run import MagnusRun, fixed_run, magnus_run, order_for
 from lie_codegen.flow.refined import refined
+from lie_codegen.flow.simulate_arguments import (
+    check_times,
+    check_tolerance,
+    check_trajectories,
+    event_functions,
+    factors_of,
+    initial_elements,
+    input_of,
+    step_count,
+)
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.patience import shows_progress
 
-_FOURTH_ORDER = ("rkmk4", "commutator_free")
-METHODS = ("auto", "magnus8", "magnus6", "magnus4", *_FOURTH_ORDER)
-_DEFAULT, _SMALLEST = 1e-11, 1e-14
+METHODS = ("auto", "magnus8", "magnus6", "magnus4", *FOURTH_ORDER)
 
 
 class Simulated(Protocol):
@@ -101,7 +108,7 @@ def simulate(
     if u is None or t is None:
         raise InputError(f"simulate({group.name}): give {'an input u' if u is None else 'the times t'}")
     times = check_times(group, t)
-    factors = _factors(group, eps)
+    factors = factors_of(group, eps)
     goal = check_tolerance(f"simulate({group.name})", rtol, atol, tolerance)
     if method not in METHODS:
         raise InputError(f"simulate({group.name}): method is one of {', '.join(METHODS)}; given {method!r}")
@@ -113,36 +120,28 @@ def simulate(
     law = as_feedback(group, u)
     if law is not None:
         return _feedback_run(group, law, times, factors, start, goal, atol, method, steps, events, resolution, threads)
-    signal = as_signal(group, _input(group, u), times)
-    _check_trajectories(group, start, factors, signal)
+    signal = as_signal(group, input_of(group, u), times)
+    check_trajectories(group, start, factors, signal)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise InputError(f"simulate({group.name}): resolution is {resolution!r}; give a positive length of time")
-    asked = _functions(group, events, signal, factors, start)
+    asked = event_functions(group, events, signal, factors, start)
     drive = as_drive(group, signal, factors, times, rtol=goal, resolution=resolution)
     order = order_for(method, goal)
-    if method in _FOURTH_ORDER:
+    if method in FOURTH_ORDER:
         if steps is not None:
             raise InputError(f"simulate({group.name}): steps go with the Magnus methods; give {method} a tolerance")
-        # A function is read from its pieces here too, so that no method meets an alias of it.
-        read = signal if signal.formula is not None else drive_signal(drive, times)
-        scale = factors if signal.formula is not None else np.ones_like(factors)
-        step = step_of(group, method)
-        X, grid, error = refined(
-            step, read, scale, start, times, rtol=goal, atol=atol, name=group.name, threads=threads
-        )
-        run = MagnusRun(X, 4, 0, grid.steps, grid.largest_step, 0.0, error + drive.error)
-    elif steps is None:
-        run = magnus_run(group, drive, times, start, order=order, rtol=goal, atol=atol, threads=threads)
+        run = _fourth_order(group, method, signal, drive, times, factors, start, goal, atol, threads)
+        X = run.X
     else:
-        run = fixed_run(group, drive, times, start, order=order, steps=_count(group, steps), threads=threads)
-    X = run.X if method in _FOURTH_ORDER else _with_start(start, run.X)
+        run = _magnus(group, drive, times, start, order, goal, atol, steps, threads)
+        X = _with_start(start, run.X)
     hits: tuple[EventHits, ...] = ()
     if asked:
         from lie_codegen.flow.magnus.events import run_events
 
         hits = run_events(group, drive, times, start, tuple(events), asked, order, run.longest)
     return Trajectory(
-        group, times, X, run.steps, run.error_estimate, method if method in _FOURTH_ORDER else f"magnus{order}",
+        group, times, X, run.steps, run.error_estimate, method if method in FOURTH_ORDER else f"magnus{order}",
         drive.evaluations, drive.resolution, hits, drive, goal, run.multiple,
     )  # fmt: skip
 
@@ -178,25 +177,27 @@ def _feedback_run(
     return feedback_flow(group, law, times, eps, start, rtol=rtol, atol=atol, threads=threads)
 
 
-def _input(group: MatrixGroup, u: Any) -> Any:
-    """Formulas as texts become a function of time, everything else stays."""
-    if not (isinstance(u, list | tuple) and len(u) > 0 and all(isinstance(each, str) for each in u)):
-        return u
-    from lie_codegen.flow.formulas import formula_input
+def _fourth_order(
+    group: MatrixGroup, method: str, signal: Signal, drive: Drive, times: Array, eps: Array, start: Array, rtol: float, atol: float,
+    threads: int,
+) -> MagnusRun:  # fmt: skip
+    """A run by steps of the fourth order, halved until two runs agree."""
+    # A function is read from its pieces here too, so that no method meets an alias of it; they hold eps already.
+    read = signal if signal.formula is not None else drive_signal(drive, times)
+    scale = eps if signal.formula is not None else np.ones_like(eps)
+    step = step_of(group, method)
+    X, grid, error = refined(step, read, scale, start, times, rtol=rtol, atol=atol, name=group.name, threads=threads)
+    return MagnusRun(X, 4, 0, grid.steps, grid.largest_step, 0.0, error + drive.error)
 
-    return formula_input(group, u)
 
-
-def _functions(
-    group: MatrixGroup, events: Sequence[Event], signal: Signal, eps: Array, start: Array
-) -> tuple[EventFunction, ...]:
-    """The events as functions, before anything is integrated."""
-    if not isinstance(events, list | tuple) or not all(isinstance(each, Event) for each in events):
-        raise InputError(f"simulate({group.name}): events is a list of lc.Event, given {events!r:.80}")
-    many = start.ndim == 3 or eps.ndim or (signal.formula is not None and signal.formula.trajectories is not None)
-    if events and many:
-        raise InputError(f"simulate({group.name}): events are of one trajectory; simulate it alone")
-    return tuple(event_function(event, group.degree, group.is_complex) for event in events)
+def _magnus(
+    group: MatrixGroup, drive: Drive, times: Array, start: Array, order: int, rtol: float, atol: float, steps: int | None,
+    threads: int,
+) -> MagnusRun:  # fmt: skip
+    """The states after the start by Magnus steps, as many as the tolerance asks for or as were given."""
+    if steps is None:
+        return magnus_run(group, drive, times, start, order=order, rtol=rtol, atol=atol, threads=threads)
+    return fixed_run(group, drive, times, start, order=order, steps=step_count(group, steps), threads=threads)
 
 
 def _with_start(start: Array, later: Array) -> Array:
@@ -204,100 +205,6 @@ def _with_start(start: Array, later: Array) -> Array:
     return np.concatenate([np.broadcast_to(start, (1, *later.shape[1:])), later])
 
 
-def check_tolerance(where: str, rtol: float | None, atol: float, tolerance: float | None) -> float:
-    """The one tolerance that was given.
-
-    Raises:
-        InputError: rtol and tolerance together, one below 1e-14 or not finite, a negative atol.
-    """
-    if rtol is not None and tolerance is not None:
-        raise InputError(f"{where}: give rtol, or its old name tolerance, not both")
-    name, value = ("tolerance", tolerance) if tolerance is not None else ("rtol", rtol)
-    goal = _DEFAULT if value is None else value
-    if not (isinstance(goal, int | float | np.floating) and np.isfinite(goal) and goal > 0):
-        raise InputError(f"{where}: {name} must be positive, got {value!r}")
-    if goal < _SMALLEST:
-        raise InputError(f"{where}: {name} = {goal:g} is below {_SMALLEST:g}, which double precision does not reach")
-    if not (np.isfinite(atol) and atol >= 0):
-        raise InputError(f"{where}: atol must not be negative, got {atol!r}")
-    return float(goal)
-
-
-def _count(group: MatrixGroup, steps: Any) -> int:
-    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= MOST_STEPS:
-        raise InputError(f"simulate({group.name}): steps is an integer from 1 to {MOST_STEPS}, given {steps!r}")
-    return int(steps)
-
-
-def _factors(group: MatrixGroup, eps: ArrayLike) -> Array:
-    try:
-        factors = np.asarray(eps, dtype=float)
-    except (TypeError, ValueError):
-        raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number") from None
-    if not np.all(np.isfinite(factors)):
-        raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number")
-    if factors.ndim > 1 or not factors.size:
-        raise ShapeError(f"simulate({group.name}): eps has shape {factors.shape}; give a number, or (N,) of them")
-    return factors
-
-
-def _check_trajectories(group: MatrixGroup, start: Array, eps: Array, u: Signal) -> None:
-    given = {
-        "X0": len(start) if start.ndim == 3 else None,
-        "eps": len(eps) if eps.ndim else None,
-        "u": u.formula.trajectories if u.formula is not None else None,
-    }
-    counts = {name: count for name, count in given.items() if count is not None}
-    if len(set(counts.values())) > 1:
-        text = ", ".join(f"{name} has {count}" for name, count in counts.items())
-        raise ShapeError(f"simulate({group.name}): give one number of trajectories; {text}")
-
-
 def _is_simulated(what: Any) -> TypeGuard[Simulated]:
     """By its class: to ask a protocol takes ten microseconds of a call of a hundred."""
     return hasattr(type(what), "__simulate__")
-
-
-def check_times(group: MatrixGroup, t: ArrayLike) -> Array:
-    """(k,) increasing times.
-
-    Raises:
-        InputError, ShapeError, NotFiniteError: they are none.
-    """
-    try:
-        times = np.asarray(t, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"simulate({group.name}): t must be an array of numbers, got {t!r}") from None
-    if times.ndim != 1 or len(times) < 2:
-        raise ShapeError(f"simulate({group.name}): t has shape {times.shape}; give two or more times")
-    if not np.all(np.isfinite(times)):
-        raise NotFiniteError(f"simulate({group.name}): t holds NaN or infinity")
-    if np.any(np.diff(times) <= 0):
-        raise InputError(f"simulate({group.name}): t must increase strictly")
-    return times
-
-
-def initial_elements(group: MatrixGroup, X0: ArrayLike | None) -> Array:
-    """X0, the identity if not given, as an element of the group, or (N, d, d) of them.
-
-    Raises:
-        ShapeError, NotFiniteError, NotOnGroupError: it is none.
-    """
-    kind = complex if group.is_complex else float
-    d = group.degree
-    if X0 is None:
-        return np.eye(d, dtype=kind)
-    given = np.asarray(X0)
-    if given.dtype.kind not in "biufc":
-        raise ShapeError(f"simulate({group.name}): X0 must be a ({d}, {d}) array of numbers, got {X0!r}")
-    if not group.is_complex and np.iscomplexobj(given):
-        raise ShapeError(f"simulate({group.name}): X0 is complex, the group is real")
-    start = np.ascontiguousarray(given, dtype=kind)
-    if start.ndim not in (2, 3) or start.shape[-2:] != (d, d) or not start.size:
-        raise ShapeError(
-            f"simulate({group.name}): X0 has shape {start.shape}; it must be ({d}, {d}), or (N, {d}, {d}) of N trajectories"
-        )
-    if not np.all(np.isfinite(start)):
-        raise NotFiniteError(f"simulate({group.name}): X0 holds NaN or infinity")
-    where = f"simulate({group.name}): X0"
-    return admitted(group, start, where).X if start.ndim == 2 else admitted_all(group, start, where)[0]

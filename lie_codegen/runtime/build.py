@@ -102,8 +102,8 @@ def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None, real
     """The kernels run by CasADi's interpreter, in doubles: no compiler, the same results (rounded, for floats)."""
     from lie_codegen.codegen.package import render_library
     from lie_codegen.kernel.casadi_arithmetic import function_of
-    from lie_codegen.runtime.backend import InterpretedBackend, Rounded
     from lie_codegen.runtime.call import Compiled
+    from lie_codegen.runtime.interpreted import InterpretedBackend, Rounded
 
     namespace = _namespace(namespace, kernels)
     signatures = render_library(namespace, kernels, real).signatures  # refuses what C would refuse

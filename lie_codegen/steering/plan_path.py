@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.attitude_metrics import second_kind_along
-from lie_codegen.flow.simulate import check_times, check_tolerance, initial_elements, simulate
+from lie_codegen.flow.simulate import simulate
+from lie_codegen.flow.simulate_arguments import check_times, check_tolerance, initial_elements
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.driven import Driven, simulate_driven

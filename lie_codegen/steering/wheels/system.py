@@ -27,11 +27,12 @@ from lie_codegen.mechanics.actuators import MomentumWheels
 from lie_codegen.mechanics.body_frame import body_frame
 from lie_codegen.signals.periodic_input import PeriodicInput
 from lie_codegen.steering.wheels.body import WheeledBody
-from lie_codegen.steering.wheels.loop import closed_loop_of
+from lie_codegen.steering.wheels.closed_loop import closed_loop_of
 from lie_codegen.steering.wheels.motion import WheelRun, simulated
 from lie_codegen.steering.wheels.package import system_parts
-from lie_codegen.steering.wheels.plan import WheelPlan, planned
+from lie_codegen.steering.wheels.plan import WheelPlan
 from lie_codegen.steering.wheels.read import read_directions, read_each, read_limits
+from lie_codegen.steering.wheels.steer import planned
 
 
 class WheelSystem(WheeledBody):

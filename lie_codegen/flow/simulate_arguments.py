@@ -1,0 +1,138 @@
+"""What lc.simulate is given, checked: times, tolerances, initial elements, numbers of trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.arrays import Array
+from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.flow.events import Event, event_function
+from lie_codegen.flow.events import Function as EventFunction
+from lie_codegen.flow.inputs import Signal
+from lie_codegen.flow.magnus.run import MOST_STEPS
+from lie_codegen.groups.maps.admission import admitted, admitted_all
+from lie_codegen.groups.matrix_group import MatrixGroup
+
+_DEFAULT, _SMALLEST = 1e-11, 1e-14
+
+
+def input_of(group: MatrixGroup, u: Any) -> Any:
+    """Formulas as texts become a function of time, everything else stays."""
+    if not (isinstance(u, list | tuple) and len(u) > 0 and all(isinstance(each, str) for each in u)):
+        return u
+    from lie_codegen.flow.formulas import formula_input
+
+    return formula_input(group, u)
+
+
+def event_functions(
+    group: MatrixGroup, events: Sequence[Event], signal: Signal, eps: Array, start: Array
+) -> tuple[EventFunction, ...]:
+    """The events as functions, before anything is integrated."""
+    if not isinstance(events, list | tuple) or not all(isinstance(each, Event) for each in events):
+        raise InputError(f"simulate({group.name}): events is a list of lc.Event, given {events!r:.80}")
+    many = start.ndim == 3 or eps.ndim or (signal.formula is not None and signal.formula.trajectories is not None)
+    if events and many:
+        raise InputError(f"simulate({group.name}): events are of one trajectory; simulate it alone")
+    return tuple(event_function(event, group.degree, group.is_complex) for event in events)
+
+
+def check_tolerance(where: str, rtol: float | None, atol: float, tolerance: float | None) -> float:
+    """The one tolerance that was given.
+
+    Raises:
+        InputError: rtol and tolerance together, one below 1e-14 or not finite, a negative atol.
+    """
+    if rtol is not None and tolerance is not None:
+        raise InputError(f"{where}: give rtol, or its old name tolerance, not both")
+    name, value = ("tolerance", tolerance) if tolerance is not None else ("rtol", rtol)
+    goal = _DEFAULT if value is None else value
+    if not (isinstance(goal, int | float | np.floating) and np.isfinite(goal) and goal > 0):
+        raise InputError(f"{where}: {name} must be positive, got {value!r}")
+    if goal < _SMALLEST:
+        raise InputError(f"{where}: {name} = {goal:g} is below {_SMALLEST:g}, which double precision does not reach")
+    if not (np.isfinite(atol) and atol >= 0):
+        raise InputError(f"{where}: atol must not be negative, got {atol!r}")
+    return float(goal)
+
+
+def step_count(group: MatrixGroup, steps: Any) -> int:
+    """The number of equal steps, a whole one that can be taken."""
+    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or not 1 <= steps <= MOST_STEPS:
+        raise InputError(f"simulate({group.name}): steps is an integer from 1 to {MOST_STEPS}, given {steps!r}")
+    return int(steps)
+
+
+def factors_of(group: MatrixGroup, eps: ArrayLike) -> Array:
+    """eps as a number or (N,) of them."""
+    try:
+        factors = np.asarray(eps, dtype=float)
+    except (TypeError, ValueError):
+        raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number") from None
+    if not np.all(np.isfinite(factors)):
+        raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number")
+    if factors.ndim > 1 or not factors.size:
+        raise ShapeError(f"simulate({group.name}): eps has shape {factors.shape}; give a number, or (N,) of them")
+    return factors
+
+
+def check_trajectories(group: MatrixGroup, start: Array, eps: Array, u: Signal) -> None:
+    """Refuse starts, factors and inputs of different numbers of trajectories."""
+    given = {
+        "X0": len(start) if start.ndim == 3 else None,
+        "eps": len(eps) if eps.ndim else None,
+        "u": u.formula.trajectories if u.formula is not None else None,
+    }
+    counts = {name: count for name, count in given.items() if count is not None}
+    if len(set(counts.values())) > 1:
+        text = ", ".join(f"{name} has {count}" for name, count in counts.items())
+        raise ShapeError(f"simulate({group.name}): give one number of trajectories; {text}")
+
+
+def check_times(group: MatrixGroup, t: ArrayLike) -> Array:
+    """(k,) increasing times.
+
+    Raises:
+        InputError, ShapeError, NotFiniteError: they are none.
+    """
+    try:
+        times = np.asarray(t, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"simulate({group.name}): t must be an array of numbers, got {t!r}") from None
+    if times.ndim != 1 or len(times) < 2:
+        raise ShapeError(f"simulate({group.name}): t has shape {times.shape}; give two or more times")
+    if not np.all(np.isfinite(times)):
+        raise NotFiniteError(f"simulate({group.name}): t holds NaN or infinity")
+    if np.any(np.diff(times) <= 0):
+        raise InputError(f"simulate({group.name}): t must increase strictly")
+    return times
+
+
+def initial_elements(group: MatrixGroup, X0: ArrayLike | None) -> Array:
+    """X0, the identity if not given, as an element of the group, or (N, d, d) of them.
+
+    Raises:
+        ShapeError, NotFiniteError, NotOnGroupError: it is none.
+    """
+    kind = complex if group.is_complex else float
+    d = group.degree
+    if X0 is None:
+        return np.eye(d, dtype=kind)
+    given = np.asarray(X0)
+    if given.dtype.kind not in "biufc":
+        raise ShapeError(f"simulate({group.name}): X0 must be a ({d}, {d}) array of numbers, got {X0!r}")
+    if not group.is_complex and np.iscomplexobj(given):
+        raise ShapeError(f"simulate({group.name}): X0 is complex, the group is real")
+    start = np.ascontiguousarray(given, dtype=kind)
+    if start.ndim not in (2, 3) or start.shape[-2:] != (d, d) or not start.size:
+        raise ShapeError(
+            f"simulate({group.name}): X0 has shape {start.shape}; it must be ({d}, {d}), or (N, {d}, {d}) of N trajectories"
+        )
+    if not np.all(np.isfinite(start)):
+        raise NotFiniteError(f"simulate({group.name}): X0 holds NaN or infinity")
+    where = f"simulate({group.name}): X0"
+    return admitted(group, start, where).X if start.ndim == 2 else admitted_all(group, start, where)[0]
