@@ -20,7 +20,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, PeriodError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.ode import EVENT, REACHED, Field, Motion, integrate
+from lie_codegen.runtime.ode import EVENT, REACHED, Motion, integrate
+from lie_codegen.runtime.ode_field import Field
 
 _RTOL, _ATOL = 1e-13, 1e-15
 _RETURNS, _ITERATIONS = 40, 40

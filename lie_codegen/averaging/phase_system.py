@@ -25,7 +25,8 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.ode import REACHED, Field, integrate
+from lie_codegen.runtime.ode import REACHED, integrate
+from lie_codegen.runtime.ode_field import Field
 
 NAMESPACE = "phase_average"
 #: Phases that are tried first.

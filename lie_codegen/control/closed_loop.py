@@ -9,20 +9,13 @@ from typing import Any, Literal, Never, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.control.curve_reference import CurveReference, check_curve
 from lie_codegen.control.disturbance import ForceBody
-from lie_codegen.control.loop_adaptive import adaptive, by_gauss, loop_events, loop_system
 from lie_codegen.control.loop_arguments import loop_arguments
-from lie_codegen.control.loop_library import loop_library, loop_numbers, several
-from lie_codegen.control.loop_origin import narrower, run_in_steps
-from lie_codegen.control.loop_readout import result_of
 from lie_codegen.control.loop_result import ClosedLoop
-from lie_codegen.control.loop_run import Run, noise_stream, refined
-from lie_codegen.control.loop_states import initial_own
-from lie_codegen.control.reference_check import check_once
+from lie_codegen.control.loop_simulation import loop_by, refuse
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import Event
-from lie_codegen.identifiers import shown, unknown_keywords
+from lie_codegen.identifiers import unknown_keywords
 from lie_codegen.runtime.patience import shows_progress
 
 
@@ -183,38 +176,28 @@ def closed_loop(
         known = set(inspect.signature(closed_loop).parameters) - {"unknown"}
         raise InputError(unknown_keywords("closed_loop", unknown, known))
     if mpc is not None:
-        of_law = {
+        given = {
             "group": group, "law": law, "inertia": inertia, "gains": gains, "reference": reference, "xi0": xi0, "rtol": rtol,
             "step": step, "sample": sample, "limits": limits, "disturbance": disturbance, "observer": observer, "states": states,
             "external": external, "tolerance": tolerance, "order": order, "first": first or None, "events": events or None,
             "threads": None if threads == 1 else threads, "method": None if method == "auto" else method,
         }  # fmt: skip
-        stray = [name for name, value in of_law.items() if value is not None]
-        if stray:
-            raise InputError(
-                f"closed_loop: {', '.join(stray)} beside mpc=; the controller brings its group, sample and limits, and the body is "
-                "its problem or plant="
-            )
-        given = {
+        refuse(
+            given,
+            "beside mpc=; the controller brings its group, sample and limits, and the body is its problem or plant=",
+        )
+        options = {
             "values": values, "plant": plant, "plant_values": plant_values, "noise": noise, "delay": delay,
             "compensate": compensate, "substeps": substeps, "seed": seed, "runs": runs,
         }  # fmt: skip
         times = np.asarray(t, dtype=float)
         # the controller brings its own loop: it lives on a floor above this one
-        chosen = {name: value for name, value in given.items() if value is not None}
+        chosen = {name: value for name, value in options.items() if value is not None}
         return mpc.simulate(X0, duration=float(times[-1] - times[0]), **chosen)
     of_mpc = {
-        "values": values,
-        "plant": plant,
-        "plant_values": plant_values,
-        "compensate": compensate,
-        "substeps": substeps,
-    }
-    stray = [name for name, value in of_mpc.items() if value is not None]
-    if stray:
-        raise InputError(
-            f"closed_loop: {', '.join(stray)} without mpc=; these options are those of a controller of lc.mpc"
-        )
+        "values": values, "plant": plant, "plant_values": plant_values, "compensate": compensate, "substeps": substeps,
+    }  # fmt: skip
+    refuse(of_mpc, "without mpc=; these options are those of a controller of lc.mpc")
     told = loop_arguments(
         group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step, sample=sample,
         delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains, order=order,
@@ -225,49 +208,4 @@ def closed_loop(
         )
     if method not in ("auto", "gauss"):
         raise InputError(f'closed_loop: method is "auto" or "gauss", given {method!r}')
-    by_rate = told.kind == "continuous" and (told.step is None or method == "gauss")
-    chosen_kind = "adaptive" if by_rate else told.kind
-    loop, library = loop_library(told.model, told.reference, chosen_kind)
-    numbers, loops = loop_numbers(loop, told.inertia, gains or {}, told.numbers)
-    if told.reference is not None:
-        ends = float(told.times[0]), float(told.times[-1])
-        if isinstance(told.reference, CurveReference):
-            check_curve(told.reference, *ends, library.reference.batch)
-        else:
-            check_once(told.reference, *ends, library.reference)
-    start, many = loop.plant.starts(X0, xi0)
-    start, many = several(start, many, loops, runs)
-    start = initial_own(loop, start, {**told.start, **(states or {})})
-    stream = noise_stream(loop, _whole(seed, "seed", 0), _whole(first, "first", 0))
-    run = Run(loop, library, start, many, told.times, numbers, threads, told.sample or 0.0, told.delay, stream)
-    if method == "gauss":
-        if told.step is None or "loop_rate" not in library.kernels or not loop_system(run).compiled:
-            raise InputError(
-                'closed_loop: method="gauss" is of a law that acts continuously on a group; give it a step'
-            )
-        if events:
-            raise InputError("closed_loop: events go with rtol, not with method='gauss'")
-        equal = run_in_steps(run, told.model, told.reference)
-        return result_of(equal, told, by_gauss(run, told.parts), told.parts, float("nan"))
-    if events and (told.step is not None or "loop_rate" not in library.kernels or not loop_system(run).compiled):
-        raise InputError(
-            "closed_loop: events are of a law that acts continuously on a group, with rtol; not with step or sample"
-        )
-    if told.step is not None:
-        return result_of(run, told, run.states(told.parts), told.parts, float("nan"))
-    if "loop_rate" in library.kernels:
-        if loop_system(run).compiled:
-            found, pair = adaptive(run, told.rtol)
-            hits = loop_events(run, pair, events) if events else ()
-            return result_of(run, told, found, 0, pair.error_estimate, pair, hits)
-        run = run_in_steps(run, told.model, told.reference)
-    found, count, error = refined(run, told.rtol, narrower)
-    return result_of(run, told, found, count, error)
-
-
-def _whole(value: Any, name: str, default: int) -> int:
-    if value is None:
-        return default
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-        raise InputError(f"closed_loop: {name} is a whole number, not negative; given {shown(value)}")
-    return int(value)
+    return loop_by(method, told, X0, xi0, gains or {}, states or {}, seed, runs, first, threads, events)

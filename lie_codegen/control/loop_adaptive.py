@@ -14,7 +14,9 @@ from lie_codegen.control.loop_run import Run
 from lie_codegen.control.plants import GroupPlant
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import INNER, Event, EventHits, event_function, find_events
-from lie_codegen.flow.pair853 import PairRun, System, gauss, integrate
+from lie_codegen.flow.gauss_steps import gauss
+from lie_codegen.flow.pair853 import PairRun, integrate
+from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
 
 #: The relative part of a tolerance that is absolute: rounding.

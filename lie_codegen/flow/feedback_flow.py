@@ -15,7 +15,8 @@ from lie_codegen.flow.attitude_metrics import second_kind_along
 from lie_codegen.flow.feedback_kernels import feedback_library, feedback_value
 from lie_codegen.flow.feedback_law import Feedback
 from lie_codegen.flow.feedback_python import interpreted
-from lie_codegen.flow.pair853 import System, integrate
+from lie_codegen.flow.pair853 import integrate
+from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
 from lie_codegen.flow.product_step import Move
 from lie_codegen.flow.second_kind_coordinates import second_kind

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.inputs import Signal
-from lie_codegen.runtime.drive import Spans
+from lie_codegen.runtime.drive_arguments import Spans
 
 
 @dataclass(frozen=True)

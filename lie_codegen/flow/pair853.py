@@ -7,25 +7,17 @@ what they add up to is judged by a second run at another tolerance, so that the 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
-from lie_codegen.codegen.templates import template_folder
-from lie_codegen.errors import CompileError, ComputationError
-from lie_codegen.runtime.backend import load_library
-from lie_codegen.runtime.call import Compiled
-from lie_codegen.runtime.pair_headers import pair_headers
-from lie_codegen.runtime.sources import build_source
+from lie_codegen.errors import ComputationError
+from lie_codegen.flow.pair_library import FULL, LOST, STUCK, compiled_pair
+from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.threads import share_out
 
-_STAGES = 12
-_DONE, _FULL, _STUCK, _LOST = range(4)
 #: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots.
 _STEPS = 4096
 #: Members that go with one step size: enough for lanes, few enough for the cache; and of the pilot.
@@ -33,66 +25,8 @@ _BLOCK, _PILOT = 64, 16
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 8.0
 _SMALLEST, _MOST_RUNS = 1e-15, 6
-#: Gauss steps in one call.
-_GAUSS_BLOCK = 20_000
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
-
-
-class _Pair(ctypes.Structure):
-    _fields_ = [
-        *((n, ctypes.c_void_p) for n in ("rate", "move", "rate_batch", "move_batch")),
-        *((n, ctypes.c_ssize_t) for n in ("members", "packed", "group", "size", "numbers")),
-        *((n, ctypes.c_void_p) for n in ("number", "number_stride")),
-        *((n, ctypes.c_double) for n in ("t", "t_low", "h", "rtol", "atol", "reach", "longest")),
-        *((n, ctypes.c_void_p) for n in ("X", "y", "times")),
-        *((n, ctypes.c_ssize_t) for n in ("count", "next", "row")),
-        *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y")),
-        *((n, ctypes.c_ssize_t) for n in ("room", "knots")), ("work", ctypes.c_void_p),
-        *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations")),
-    ]  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class System:
-    """What is integrated.
-
-    Attributes:
-        rate: kernel (X packed, y, t, numbers...) -> y', y = (Theta, xi, ...).
-        move: kernel (X packed, Theta) -> X exp(Theta), packed.
-        group: n, entries of Theta.
-        reach: |Theta| up to which a step may go.
-        numbers: the other inputs of the rate in its order, of all members (*shape) or one each (N, *shape).
-    """
-
-    rate: Compiled[Any]
-    move: Compiled[Any]
-    group: int
-    reach: float
-    numbers: tuple[Array, ...] = ()
-
-    @property
-    def packed(self) -> int:
-        """Doubles of X."""
-        return int(self.rate.inputs[0].size)
-
-    @property
-    def size(self) -> int:
-        """Doubles of y."""
-        return int(self.rate.inputs[1].size)
-
-    @property
-    def compiled(self) -> bool:
-        """Whether compiled loops can call it."""
-        return bool(self.rate.backend.address(many=False)) and _library() is not None
-
-    def of_members(self, which: Any) -> System:
-        """That of some of the members."""
-        kept = [v[which] if self._is_own(k) else v for k, v in enumerate(self.numbers)]
-        return replace(self, numbers=tuple(kept))
-
-    def _is_own(self, k: int) -> bool:
-        return bool(self.numbers[k].ndim > len(self.rate.inputs[3 + k].shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +58,11 @@ class PairRun:
         at = np.ascontiguousarray(knots, dtype=np.intp)
         part = np.ascontiguousarray(parts, dtype=float)
         X, y = np.empty((len(at), system.packed)), np.empty((len(at), system.size))
-        work = np.empty(system.size * (_STAGES + 3) + 2 * system.packed + system.group)
-        given, _kept = _given(system, 1)
+        work = system.work(1)
+        given, _kept = system.record(1)
         given.knot_t, given.knot_h = self.knot_t.ctypes.data, self.knot_h.ctypes.data
         given.knot_X, given.knot_y, given.work = self.knot_X.ctypes.data, self.knot_y.ctypes.data, work.ctypes.data
-        library = _library()
-        assert_compiled(library)
+        library = compiled_pair()
         library.pair_within(
             ctypes.addressof(given), len(at), at.ctypes.data, part.ctypes.data, X.ctypes.data, y.ctypes.data
         )
@@ -213,21 +146,20 @@ def _to_tolerance(
 def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
     """One run of some members with one step size."""
     N, k, one = len(X0), len(times), len(X0) == 1
-    given, _kept = _given(system, N)
+    given, _kept = system.record(N)
     X, y = np.array(X0, dtype=float), np.array(y0, dtype=float)
     X_out, y_out = np.empty((k, N, system.packed)), np.empty((k, N, system.size))
     X_out[0], y_out[0] = X, y
     later = np.ascontiguousarray(times[1:], dtype=float)
-    work = np.empty(N * (system.size * (_STAGES + 3) + 2 * system.packed + system.group))
+    work = system.work(N)
     given.t, given.h, given.rtol, given.atol = float(times[0]), 0.0, rtol, atol
     given.reach, given.longest = system.reach, float(times[-1] - times[0])
     given.X, given.y, given.times, given.count, given.row = X.ctypes.data, y.ctypes.data, later.ctypes.data, k - 1, N
     given.X_out, given.y_out, given.work = X_out[1:].ctypes.data, y_out[1:].ctypes.data, work.ctypes.data
     knots: list[tuple[Array, ...]] = []
-    library = _library()
-    assert_compiled(library)
-    status = _FULL
-    while status == _FULL:
+    library = compiled_pair()
+    status = FULL
+    while status == FULL:
         room = (np.empty(_STEPS), np.empty(_STEPS), np.empty((_STEPS, system.packed)), np.empty((_STEPS, system.size)))
         if one:
             given.knot_t, given.knot_h, given.knot_X, given.knot_y = (each.ctypes.data for each in room)
@@ -239,96 +171,15 @@ def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol:
                 f"{where}: {_MOST_STEPS} steps do not bring the error below {atol:g} beyond t = {given.t:.9g}, or the state grows "
                 "without bound; shorten the time, loosen the tolerance, or check the gains"
             )
-    if status == _LOST:
+    if status == LOST:
         raise ComputationError(
             f"{where}: the state is no longer finite behind t = {given.t:.9g}; check the gains, or shorten the time"
         )
-    if status == _STUCK:
+    if status == STUCK:
         raise ComputationError(f"{where}: no step is short enough at t = {given.t:.9g}; is the force smooth there?")
     kept = tuple(np.concatenate([each[j] for each in knots]) for j in range(4)) if one else _no_knots(system)
     return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, float("nan"), *kept)
 
 
-def gauss(system: System, X0: Array, y0: Array, times: Array, parts: int, where: str) -> tuple[Array, Array]:
-    """(k, packed) and (k, size) states of one member by Gauss collocation of order 6, `parts` equal steps between equally spaced times.
-
-    Quadratic invariants of y, as the energy and the momentum of a free body, are kept to rounding over any number of steps; so
-    is the reversibility of the motion within a step. The stages are found by iteration, which asks for steps short beside the
-    fastest rate.
-
-    Raises:
-        ComputationError: a step is too long for the iteration or for the exponential, or a state is no longer finite.
-    """
-    given, _kept = _given(system, 1)
-    X, y = np.array(X0, dtype=float), np.array(y0, dtype=float)
-    k = len(times)
-    X_out, y_out = np.empty((k, system.packed)), np.empty((k, system.size))
-    X_out[0], y_out[0] = X, y
-    work = np.empty(system.size * (_STAGES + 3) + 2 * system.packed + system.group)
-    h = float(times[-1] - times[0]) / ((k - 1) * parts)
-    given.h, given.reach, given.row, given.work = h, system.reach, 1, work.ctypes.data
-    given.X, given.y = X.ctypes.data, y.ctypes.data
-    library = _library()
-    assert_compiled(library)
-    block = max(1, _GAUSS_BLOCK // parts)
-    for first in range(0, k - 1, block):
-        spans = min(block, k - 1 - first)
-        given.t, given.next = float(times[0]) + first * parts * h, 0
-        given.X_out, given.y_out = X_out[first + 1 :].ctypes.data, y_out[first + 1 :].ctypes.data
-        status = library.gauss_run(ctypes.addressof(given), spans, parts)
-        if status == _LOST:
-            raise ComputationError(f"{where}: the state is no longer finite behind t = {given.t:.9g}")
-        if status == _STUCK:
-            raise ComputationError(f"{where}: the step {h:.3g} is too long at t = {given.t:.9g}; take a shorter one")
-    return X_out, y_out
-
-
 def _no_knots(system: System) -> tuple[Array, Array, Array, Array]:
     return np.empty(0), np.empty(0), np.empty((0, system.packed)), np.empty((0, system.size))
-
-
-def _given(system: System, members: int) -> tuple[_Pair, Sequence[Any]]:
-    """The system as the C reads it, and what has to stay."""
-    numbers = [np.ascontiguousarray(v, dtype=float) for v in system.numbers]
-    strides = [v[0].size if system._is_own(k) else 0 for k, v in enumerate(numbers)]
-    pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(v.ctypes.data for v in numbers))
-    moves = (ctypes.c_ssize_t * max(1, len(numbers)))(*strides)
-    rate, move = system.rate.backend, system.move.backend
-    single = members == 1
-    given = _Pair(
-        rate=rate.address(many=False) if single else None, move=move.address(many=False) if single else None,
-        rate_batch=None if single else rate.address(many=True), move_batch=None if single else move.address(many=True),
-        members=members, packed=system.packed, group=system.group, size=system.size, numbers=len(numbers),
-        number=ctypes.addressof(pointers), number_stride=ctypes.addressof(moves),
-    )  # fmt: skip
-    return given, (numbers, pointers, moves)
-
-
-def assert_compiled(library: ctypes.CDLL | None) -> None:
-    """Raises: CompileError: there is no compiler."""
-    if library is None:
-        raise CompileError("the pair 8(5,3) needs a C compiler")
-
-
-@lru_cache(maxsize=1)
-def _library() -> Any:
-    """pair853.c, loaded; None where there is no compiler."""
-
-    def files() -> dict[str, str]:
-        text = (template_folder() / "pair853.c").read_text(encoding="utf-8")
-        return {"pair853.c": text, **pair_headers()}
-
-    try:
-        path = build_source(files, "pair853.c", namespace="pair853", definition="pair853", more_flags=("-O3",))
-    except CompileError:
-        return None
-    if path is None:
-        return None
-    library, size, pointer = load_library(path), ctypes.c_ssize_t, ctypes.c_void_p
-    library.pair_run.restype, library.pair_run.argtypes = size, (pointer, size)
-    library.gauss_run.restype, library.gauss_run.argtypes = size, (pointer, size, size)
-    library.pair_within.restype, library.pair_within.argtypes = (
-        None,
-        (pointer, size, pointer, pointer, pointer, pointer),
-    )
-    return library

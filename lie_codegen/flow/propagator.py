@@ -18,7 +18,7 @@ from lie_codegen.flow.magnus.run import BLOCK, MOST_STEPS, MagnusRun, as_run, ma
 from lie_codegen.flow.magnus.solver import LONG, REACHED, WaveRuns
 from lie_codegen.flow.magnus.tangents import tangents
 from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive, wave_numbers
-from lie_codegen.flow.propagation import Power, PropagationBatch
+from lie_codegen.flow.propagation import Power, PropagationBatch, power_of
 from lie_codegen.flow.simulate_arguments import check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -229,16 +229,7 @@ class Propagator(Saved):
             raise InputError(f'propagator({self.group.name}): powers are of one period; give duration="period"')
         if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 0 <= n <= _LARGEST_POWER:
             raise InputError(f"propagator({self.group.name}).power: n is an integer from 0 to 10^12, given {n!r}")
-        wide = np.clongdouble if one.X.dtype.kind == "c" else np.longdouble
-        result, square, left = np.eye(len(one.X), dtype=wide), one.X.astype(wide), int(n)
-        while left:
-            if left & 1:
-                result = result @ square
-            square = square @ square
-            left >>= 1
-        X = result.astype(one.X.dtype)
-        growth = max(1.0, float(np.max(np.abs(X))))
-        return Power(X, int(n), int(n) * (one.error_estimate + 2.2e-16) * growth)
+        return power_of(one.X, int(n), one.error_estimate)
 
     @property
     def _one(self) -> Array:

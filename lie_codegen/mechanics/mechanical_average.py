@@ -10,15 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.algebra.brackets import dexp_inverse
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.renaming import in_namespace
-from lie_codegen.kernel.runge_kutta import CLASSICAL, TUPLES, increment
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.mechanics.averaging_map import AveragingMap
 from lie_codegen.mechanics.effective_potential import EffectivePotential, effective_potential
 from lie_codegen.mechanics.mechanical_fields import GAUGES, MOST, MechanicalFields, fourier_of
 from lie_codegen.mechanics.mechanical_kernels import (
@@ -31,14 +29,9 @@ from lie_codegen.mechanics.mechanical_kernels import (
 )
 from lie_codegen.mechanics.mechanical_run import GroupRun, run, states_of
 from lie_codegen.mechanics.mechanical_system import MechanicalSystem
-from lie_codegen.mechanics.polynomial_fields import Field
-from lie_codegen.mechanics.polynomial_kernels import evaluate
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.library import Library
 from lie_codegen.signals.periodic_input import PeriodicInput
-
-#: Steps of the unit-time flow of the frozen correction, a motion of size eps: its error is far below that of any order.
-_FLOW_STEPS = 8
 
 
 class GroupState(NamedTuple):
@@ -89,6 +82,10 @@ class MechanicalAverage(Saved):
         """F_q and Lambda_q as polynomials."""
         return MechanicalFields(self.system, fourier_of(self.u)[0], self.order, self.gauge, self.constant)
 
+    @cached_property
+    def _map(self) -> AveragingMap:
+        return AveragingMap(self.fields)
+
     @property
     def symmetric(self) -> tuple[int, ...]:
         """Orders that vanish by symmetry: the even ones, where all primitives are even about one instant."""
@@ -104,23 +101,23 @@ class MechanicalAverage(Saved):
             **advected: the vectors by name, G=(0, 0, 1).
         """
         self._check_order(q)
-        return self._value(self.fields.solution[0][q - 1], self._state(xi, X, advected))
+        return self._map.value(self.fields.solution[0][q - 1], self._map.state(xi, X, advected))
 
     def correction(
         self, q: int, tau: ArrayLike, xi: ArrayLike, X: ArrayLike | None = None, **advected: ArrayLike
     ) -> Array:
         """Lambda_q at fast time tau, (..., 2, n); q = 1 .. order - 1."""
         self._check_order(q, self.order - 1)
-        state = self._state(xi, X, advected)
+        state = self._map.state(xi, X, advected)
         when = np.broadcast_to(np.asarray(tau, dtype=float), state.shape[:-1])
         field = self.fields.solution[1][q - 1]
-        return self._value(field, state, self._at(field, when))
+        return self._map.value(field, state, self._map.at(field, when))
 
     def rate(self, xi: ArrayLike, eps: ArrayLike, X: ArrayLike | None = None, **advected: ArrayLike) -> Array:
         """sum_q eps^(q-1) F_q, (..., 2, n): X' = X hat(alpha), xi' = beta."""
-        state = self._state(xi, X, advected)
+        state = self._map.state(xi, X, advected)
         power = np.asarray(eps, dtype=float)[..., None, None]
-        terms = [power**q * self._value(f, state) for q, f in enumerate(self.fields.solution[0])]
+        terms = [power**q * self._map.value(f, state) for q, f in enumerate(self.fields.solution[0])]
         return np.asarray(sum(terms[1:], terms[0]))
 
     def estimate(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike) -> GroupState:
@@ -131,11 +128,11 @@ class MechanicalAverage(Saved):
             tau: (...) t / eps.
             eps: (...) positive.
         """
-        return self._estimated(X, xi, tau, eps, self.order)
+        return GroupState(*self._map.estimated(X, xi, tau, eps, self.order))
 
     def reconstruct(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike) -> GroupState:
         """The actual state of an averaged one: y = shift(tau) o flow_1(Lambda(tau)) (z)."""
-        return self._reconstructed(X, xi, tau, eps, self.order)
+        return GroupState(*self._map.reconstructed(X, xi, tau, eps, self.order))
 
     def solve(self, X0: ArrayLike, xi0: ArrayLike, t: ArrayLike, eps: float, *, tolerance: float = 1e-11) -> GroupRun:
         """The averaged system from the averaged state (X0, xi0) at t[0], compiled.
@@ -233,23 +230,14 @@ class MechanicalAverage(Saved):
     def _steps(self) -> dict[str, Any]:
         return {}
 
-    def _estimated(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike, order: int) -> GroupState:
-        Y, eta, when, small = self._points(X, xi, tau, eps)
-        return self._flow(Y, eta - self._shift(Y, when), when, -small, small, order)
-
-    def _reconstructed(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike, order: int) -> GroupState:
-        Y, eta, when, small = self._points(X, xi, tau, eps)
-        moved = self._flow(Y, eta, when, small, small, order)
-        return GroupState(moved.X, moved.xi + self._shift(moved.X, when))
-
     def _predicted(
         self, X0: ArrayLike, xi0: ArrayLike, times: Array, eps: float, tolerance: float, order: int
     ) -> GroupRun:
         """By F_1 .. F_order and Lambda_1 .. Lambda_{order - 1} alone."""
-        z = self._estimated(X0, xi0, times[0] / eps, eps, order)
-        averaged = self._solved("average_step", z.X, z.xi, times, eps, tolerance, order)
-        y = self._reconstructed(averaged.X, averaged.xi, times / eps, eps, order)
-        return replace(averaged, X=y.X, xi=y.xi)
+        z = self._map.estimated(X0, xi0, times[0] / eps, eps, order)
+        averaged = self._solved("average_step", *z, times, eps, tolerance, order)
+        X, xi = self._map.reconstructed(averaged.X, averaged.xi, times / eps, eps, order)
+        return replace(averaged, X=X, xi=xi)
 
     def _solved(
         self, name: str, X0: ArrayLike, xi0: ArrayLike, t: ArrayLike, eps: float, tolerance: float, order: int = MOST
@@ -273,88 +261,6 @@ class MechanicalAverage(Saved):
         most = self.order if most is None else most
         if isinstance(q, bool) or not isinstance(q, int | np.integer) or not 1 <= q <= most:
             raise InputError(f"the terms of this average are those of order 1 to {most}, got {q!r}")
-
-    def _state(self, xi: ArrayLike, X: ArrayLike | None, advected: dict[str, ArrayLike]) -> Array:
-        velocity = np.asarray(xi, dtype=float)
-        if velocity.shape[-1:] != (self.system.dim,):
-            raise ShapeError(f"xi has shape {velocity.shape}; its last axis must be {self.system.dim}")
-        if X is not None:
-            if advected:
-                raise InputError("give X or the advected vectors, not both")
-            parts = [velocity, self.system.seen(np.asarray(X))]
-        else:
-            names = [a.name for a in self.system.advected]
-            wrong = [
-                *(name for name in names if name not in advected),
-                *(name for name in advected if name not in names),
-            ]
-            if wrong:
-                raise InputError(
-                    f"advected vectors: {', '.join(names) or 'none'} needed, got {', '.join(advected) or 'none'}"
-                )
-            parts = [velocity, *(np.asarray(advected[name], dtype=float) for name in names)]
-        for vector, part in zip(self.system.advected, parts[1:] if X is None else (), strict=False):
-            if part.shape[-1:] != (vector.size,):
-                raise ShapeError(f"{vector.name} has shape {part.shape}; its last axis must be {vector.size}")
-        shape = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
-        return np.concatenate([np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts], axis=-1)
-
-    def _points(self, X: ArrayLike, xi: ArrayLike, tau: ArrayLike, eps: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        group = self.system.group
-        Y = np.asarray(X, dtype=complex if group.is_complex else float)
-        eta, when, small = (np.asarray(each, dtype=float) for each in (xi, tau, eps))
-        d, n = group.degree, group.dim
-        if Y.shape[-2:] != (d, d) or eta.shape[-1:] != (n,):
-            raise ShapeError(
-                f"X has shape {Y.shape} and xi {eta.shape}; {group.name} needs (..., {d}, {d}) and (..., {n})"
-            )
-        if np.any(small <= 0):
-            raise InputError("eps must be positive")
-        shape = np.broadcast_shapes(Y.shape[:-2], eta.shape[:-1], when.shape, small.shape)
-        return (
-            np.broadcast_to(Y, (*shape, d, d)), np.broadcast_to(eta, (*shape, n)),
-            np.broadcast_to(when, shape), np.broadcast_to(small, shape),
-        )  # fmt: skip
-
-    def _at(self, field: Field, when: Array) -> Array:
-        """(..., K) coefficients at fast times, by trigonometric interpolation, which is exact."""
-        M, values = self.fields.nodes, field.values
-        spectrum = np.fft.rfft(np.broadcast_to(values, (len(values), M)), axis=1) / M
-        spectrum[:, 1:] *= 2
-        waves = np.exp(2j * np.pi / self.fields.forcing.period * when[..., None] * np.arange(spectrum.shape[1]))
-        return np.asarray((waves @ spectrum.T).real)
-
-    def _value(self, field: Field, state: Array, values: Array | None = None) -> Array:
-        flat = evaluate(self.fields.space, field, state, values)
-        return np.asarray(flat.reshape(*flat.shape[:-1], 2, self.system.dim))
-
-    def _shift(self, X: Array, when: Array) -> Array:
-        """U^a(tau) Y_a(Gamma), (..., n)."""
-        state = self._state(np.zeros((*X.shape[:-2], self.system.dim)), X, {})
-        U = self.fields.shift(when)
-        parts = [U[..., a, None] * self._value(lift, state)[..., 1, :] for a, lift in enumerate(self.fields.lifts)]
-        return np.asarray(sum(parts[1:], parts[0]))
-
-    def _flow(self, X: Array, xi: Array, when: Array, first: Array, eps: Array, order: int) -> GroupState:
-        """Unit-time flow of first * sum eps^(q-1) Lambda_q(tau): fourth order on the group, batched."""
-        logarithms = self.fields.solution[1][: order - 1]
-        if not logarithms:
-            return GroupState(X, xi)
-        frozen = [(f, first[..., None] * eps[..., None] ** q * self._at(f, when)) for q, f in enumerate(logarithms)]
-        group, h = self.system.group, 1 / _FLOW_STEPS
-
-        def slope(_: float, moved: tuple[Array, Array]) -> tuple[Array, Array]:
-            theta, change = moved
-            state = self._state(xi + change, X @ expm(group.hat(theta)), {})
-            parts = [self._value(f, state, values) for f, values in frozen]
-            total = sum(parts[1:], parts[0])
-            alpha, beta = total[..., 0, :], total[..., 1, :]
-            return dexp_inverse(group.algebra, theta, alpha), beta
-
-        for _ in range(_FLOW_STEPS):
-            theta, change = increment(TUPLES, CLASSICAL, slope, (np.zeros_like(xi), np.zeros_like(xi)), h)
-            X, xi = X @ expm(group.hat(theta)), xi + change
-        return GroupState(X, xi)
 
 
 def mechanical_average(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.near_identity import to_mean
-from lie_codegen.errors import ComputationError, InputError
+from lie_codegen.errors import InputError
 from lie_codegen.groups.build import build
-from lie_codegen.kernel.elliptic import nome
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.rigid_body import euler_kernels
@@ -30,11 +28,11 @@ from lie_codegen.rigid_body.euler_second_order import (
 from lie_codegen.rigid_body.euler_variational import EulerPerturbation, euler_perturbation
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, SlowState, check_slow
 from lie_codegen.rigid_body.phase_as_time import cycle_growth, phase_time_kernels
+from lie_codegen.rigid_body.phase_quadrature import nodes_for, phase_means
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
 
 NAMESPACE = "euler_average"
-_MOST_NODES = 8192
 
 
 class Variational(NamedTuple):
@@ -241,25 +239,12 @@ class EulerAverage(Saved):
                 give the same means to `tolerance`.
         """
         self._check(Omega, k)
-        spin, modulus, slow = (np.asarray(x, dtype=np.float64)[..., None] for x in (Omega, k, tau))
-        count = nodes or nodes_for(float(np.max(modulus)))
-        while True:
-            phases = np.arange(count) / count
-            values = np.stack(self.variational(spin, modulus, phases, slow)[:3])
-            means = values.mean(axis=-1)
-            error = np.abs(means - values[..., ::2].mean(axis=-1))
-            sizes = np.abs(values).mean(axis=-1)
-            rate = np.max([sizes[0] / spin[..., 0], sizes[1], sizes[2]], axis=0)
-            scale = np.stack([rate * spin[..., 0], rate, rate])
-            if nodes or bool(np.all(error <= self.tolerance * scale + 1e-300)):
-                return Averaged(*means)
-            count *= 2
-            if count > _MOST_NODES:
-                raise ComputationError(
-                    f"the averages over phi have converged to {float(np.max(error / (scale + 1e-300))):.1e} with "
-                    f"{_MOST_NODES} phases, not to {self.tolerance:.1e}: the perturbation is not smooth (abs?); "
-                    "give a larger tolerance"
-                )
+
+        def functions(phi: Array) -> Array:
+            spin, modulus, slow = (np.asarray(x, dtype=np.float64)[..., None] for x in (Omega, k, tau))
+            return np.stack(self.variational(spin, modulus, phi, slow)[:3])
+
+        return Averaged(*phase_means(functions, np.asarray(Omega, dtype=np.float64), k, self.tolerance, nodes))
 
     def rate(self, omega: ArrayLike, eps: ArrayLike, tau: ArrayLike = 0.0) -> Array:
         """omega' (..., 3) of the full equations (3) in the user's axes."""
@@ -274,17 +259,6 @@ class EulerAverage(Saved):
             raise InputError("Omega = 0: there is no torque-free motion to average over")
         if not at_zero and np.any(np.asarray(k, dtype=np.float64) == 0):
             raise InputError("k = 0 is the steady spin, the origin of the polar coordinates (k, phi): G has a pole")
-
-
-def nodes_for(k: float, tolerance: float = 1e-16) -> int:
-    """Phases the trapezoid rule needs at modulus k: Fourier coefficients fall like nome^(m/2).
-
-    The count has room for products of several elliptic functions, whose poles in the complex plane are multiple.
-    """
-    q = nome(k)
-    if q == 0:
-        return 16
-    return max(16, 8 * math.ceil((2 * math.log(tolerance) / math.log(q) + 12) / 8))
 
 
 def euler_average(

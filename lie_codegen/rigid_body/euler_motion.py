@@ -15,7 +15,8 @@ from lie_codegen.rigid_body.euler_second_order import MARGIN, EulerSolution, Mea
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, SlowState
 from lie_codegen.rigid_body.phase_as_time import third_order_motion
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
+from lie_codegen.runtime.ode import EVENT, REACHED, integrate
+from lie_codegen.runtime.ode_field import Field
 
 
 class AveragedEuler(Protocol):

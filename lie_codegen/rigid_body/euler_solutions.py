@@ -17,7 +17,8 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
-from lie_codegen.runtime.ode import REACHED, Field, integrate
+from lie_codegen.runtime.ode import REACHED, integrate
+from lie_codegen.runtime.ode_field import Field
 
 #: k of a start in the polar coordinates (k, phi).
 _LEAST = 1e-12

@@ -16,7 +16,8 @@ from lie_codegen.rigid_body.torus_map import small_divisors
 from lie_codegen.rigid_body.tumbling_body import BodyAxes, TumblingBody
 from lie_codegen.rigid_body.tumbling_kernels import MARGIN
 from lie_codegen.rigid_body.tumbling_run import TumblingRun
-from lie_codegen.runtime.ode import EVENT, REACHED, Field, integrate
+from lie_codegen.runtime.ode import EVENT, REACHED, integrate
+from lie_codegen.runtime.ode_field import Field
 
 #: |N| Tn / L beyond which an average over the free motion says little.
 LARGEST_TORQUE = 0.1

@@ -22,7 +22,8 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.rigid_body.euler_second_order import MARGIN, inside, phase_system
 from lie_codegen.rigid_body.euler_variational import EulerPerturbation
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.ode import EVENT, REACHED, Field, Motion, integrate
+from lie_codegen.runtime.ode import EVENT, REACHED, Motion, integrate
+from lie_codegen.runtime.ode_field import Field
 
 ORDER, NODES = 3, 64
 _ROUNDS = 40

@@ -9,7 +9,8 @@ from lie_codegen.rigid_body.torus_map import TorusSeries, resonant_ratios, torus
 from lie_codegen.rigid_body.tumbling_body import BodyAxes, TumblingBody
 from lie_codegen.rigid_body.tumbling_run import Resonance
 from lie_codegen.runtime.broadcast import broadcast_call
-from lie_codegen.runtime.ode import Field, Motion
+from lie_codegen.runtime.ode import Motion
+from lie_codegen.runtime.ode_field import Field
 
 _FINER = 8
 

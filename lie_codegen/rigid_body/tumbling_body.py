@@ -19,7 +19,7 @@ from lie_codegen.rigid_body.inertia_matrix import principal_axes
 from lie_codegen.rigid_body.torques import Torque
 from lie_codegen.rigid_body.tumbling_kernels import NAMESPACE, tumbling_kernels
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.ode import Field
+from lie_codegen.runtime.ode_field import Field
 
 
 class BodyAxes(NamedTuple):

@@ -9,8 +9,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-import numpy as np
-
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, python_field
 from lie_codegen.door import guard_methods
@@ -21,16 +19,15 @@ from lie_codegen.runtime.arguments import (
     DTYPES,
     bind,
     checked,
-    describe,
-    dtype_of,
     named_results,
     outputs_for,
     sequences,
     unshared,
 )
 from lie_codegen.runtime.backend import Backend
+from lie_codegen.runtime.documentation import documentation, prototype, python_signature
 from lie_codegen.runtime.patience import progress
-from lie_codegen.runtime.scans import check_loop, scan, scan_batch, scan_reduced
+from lie_codegen.runtime.scans import scan, scan_batch, scan_reduced
 from lie_codegen.runtime.threads import CALLS, in_parts
 
 if TYPE_CHECKING:
@@ -75,17 +72,7 @@ class Compiled(Generic[Result]):
     @property
     def __signature__(self) -> inspect.Signature:
         """The ports as parameters: what `inspect.signature`, completion and `help` show."""
-        import inspect
-
-        inputs = [
-            inspect.Parameter(
-                python_field(port.name), inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=f"{describe(port)}"
-            )
-            for port in self.inputs
-        ]
-        out = inspect.Parameter("out", inspect.Parameter.KEYWORD_ONLY, default=None)
-        returned = ", ".join(f"{port.name}: {describe(port)}" for port in self.outputs)
-        return inspect.Signature([*inputs, out], return_annotation=returned)
+        return python_signature(self.signature)
 
     def __call__(self, *args: Any, out: Any = None, **named: Any) -> Result:
         """Evaluate once.
@@ -291,21 +278,9 @@ class Compiled(Generic[Result]):
             InputError: u is no formula of time (sample it, and use `scan`), n, every or h does not fit.
             ShapeError: as for `scan_batch`.
         """
-        from lie_codegen.runtime.drive import STAGES, Spans, driven_loop
-        from lie_codegen.runtime.formula_input import formula_input
+        from lie_codegen.runtime.drive import driven
 
-        check_loop(self, "drive", n, every)
-        for name, value in (("h", h), ("t0", t0)):
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
-                raise InputError(f"{self.name}.drive: {name} is a finite number, given {value!r}")
-        formula = formula_input(u, float(t0), float(t0) + int(n) * float(h))
-        if formula is None:
-            raise InputError(
-                f"{self.name}.drive: u must be a PeriodicInput of sines and cosines or of straight pieces, a SampledInput, "
-                "or a FormulaInput; sample other functions and use scan"
-            )
-        spans = Spans(int(n) // int(every), int(every), None, float(t0), float(h))
-        return driven_loop(self, start, formula, spans, at=at or STAGES, others=named, threads=threads)[0]
+        return driven(self, start, u, n=n, h=h, t0=t0, every=every, at=at, threads=threads, others=named)
 
     def _wrap(self, outputs: list[Array], out: Any, *, scalars: bool) -> Any:
         if out is not None:
@@ -369,28 +344,10 @@ class Compiled(Generic[Result]):
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "interpreted"
-        return f"<{how} kernel {_prototype(self.signature)}>"
+        return f"<{how} kernel {prototype(self.signature)}>"
 
 
 @makes_records
 def kernel_of_library(library: Any, name: str) -> Any:
     """A compiled kernel as pickles and files name it."""
     return library[name]
-
-
-def documentation(signature: Signature) -> str:
-    """The docstring of a compiled kernel."""
-    lines = [_prototype(signature), "", signature.formula, ""]
-    for port in signature.inputs + signature.outputs:
-        units = f" [{port.units}]" if port.units else ""
-        about = f": {port.description}" if port.description else ""
-        lines.append(f"{port.name}: {describe(port)}, {dtype_of(port, signature.real)}{units}{about}")
-    if signature.source:
-        lines += ["", f"Source: {signature.source}"]
-    return "\n".join(lines)
-
-
-def _prototype(signature: Signature) -> str:
-    inputs = ", ".join(f"{port.name} {port.shape}" for port in signature.inputs)
-    outputs = ", ".join(f"{port.name} {port.shape}" for port in signature.outputs)
-    return f"{signature.name}({inputs}) -> {outputs}"

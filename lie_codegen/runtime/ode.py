@@ -4,129 +4,23 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
-from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.codegen.templates import template_folder
-from lie_codegen.errors import CompileError, ComputationError, InputError, ShapeError
+from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.runtime import ode_numpy
-from lie_codegen.runtime.backend import load_library
-from lie_codegen.runtime.call import Compiled
-from lie_codegen.runtime.pair_headers import dense_headers, pair_headers
-from lie_codegen.runtime.sources import build_source
+from lie_codegen.runtime.ode_field import Field, only_python
+from lie_codegen.runtime.ode_library import Rules, ode_library, pointers
 
 #: Results of a run: reached the end, an event, more knots are wanted, no step is short enough.
 REACHED, EVENT, FULL, STUCK = 0, 1, 2, 3
-_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)
 _FIRST_KNOTS, _MOST_DOUBLES = 256, 2**27
 #: From so many knots on, steps of the present length that would fill the memory many times over end a run at once.
 _ENOUGH_KNOTS, _HOPELESS = 8192, 64
-
-
-class _Field(ctypes.Structure):
-    _fields_ = [("call", ctypes.c_void_p), ("other", ctypes.c_void_p)] + [
-        (n, ctypes.c_ssize_t) for n in ("size", "inputs", "state", "time", "outputs")
-    ] + [("in_", ctypes.c_void_p), ("out", ctypes.c_void_p)]  # fmt: skip
-
-
-class _Rules(ctypes.Structure):
-    _fields_ = [
-        ("rtol", ctypes.c_double),
-        ("atol", ctypes.c_void_p),
-        ("first", ctypes.c_double),
-        ("longest", ctypes.c_double),
-        ("direction", ctypes.c_void_p),
-        ("events", ctypes.c_ssize_t),
-    ]
-
-
-class Field:
-    """f(t, y) of a compiled kernel, or of a Python function, as C calls it.
-
-    Args:
-        rate: a kernel whose input `state` is y and whose first output is f (or the values of events); or f(t, y) -> (n,).
-        size: n, the size of y, also where the values are those of events.
-        state, time: names of the kernel's inputs; time None where it has none.
-        constants: the other inputs, by name.
-    """
-
-    def __init__(
-        self,
-        rate: Compiled[Any] | Callable[[float, Array], ArrayLike],
-        size: int,
-        *,
-        state: str = "y",
-        time: str | None = "t",
-        constants: Mapping[str, ArrayLike] | None = None,
-    ) -> None:
-        self.size, self.rate = size, rate
-        self._error: BaseException | None = None
-        if not _is_kernel(rate):
-            self.address, self.places, self.inputs = 0, (0, 0), []
-            self.outputs: list[Array] = []
-            return
-        names = [port.name for port in rate.inputs]
-        given = dict(constants or {})
-        self.places = (names.index(state), names.index(time) if time in names else -1)
-        self.inputs = [
-            np.zeros(port.shape) if number in self.places
-            else _filled(given.pop(port.name), port.shape)
-            for number, port in enumerate(rate.inputs)
-        ]  # fmt: skip
-        if given:
-            raise InputError(f"{rate.name} has no input {', '.join(given)}")
-        if rate.inputs[self.places[0]].size != size:
-            raise ShapeError(f"{rate.name}: {state} has {rate.inputs[self.places[0]].size} entries, not {size}")
-        self.outputs = [np.zeros(port.shape) for port in rate.outputs]
-        self.address = rate.backend.address(many=False)
-
-    def __call__(self, t: float, y: Array) -> Array:
-        """f(t, y), by Python."""
-        if not _is_kernel(self.rate):
-            return np.asarray(self.rate(t, y), dtype=float)
-        given: list[Any] = list(self.inputs)
-        given[self.places[0]] = np.reshape(y, self.rate.inputs[self.places[0]].shape)
-        if self.places[1] >= 0:
-            given[self.places[1]] = t
-        result = self.rate(*given)
-        first = result if len(self.rate.outputs) == 1 else result[0]
-        return np.atleast_1d(np.asarray(first, dtype=float)).ravel()
-
-    @cached_property
-    def record(self) -> _Field:
-        """What the C code reads."""
-        pointers = (ctypes.c_void_p * max(1, len(self.inputs)))(*[each.ctypes.data for each in self.inputs])
-        results = (ctypes.c_void_p * max(1, len(self.outputs)))(*[each.ctypes.data for each in self.outputs])
-        callback = None if self.address else _CALLBACK(self._called)
-        self._kept = (pointers, results, callback)  # alive as long as the field is
-        return _Field(
-            self.address or None,
-            None if callback is None else ctypes.cast(callback, ctypes.c_void_p).value,
-            self.size, len(self.inputs), *self.places, len(self.outputs),
-            ctypes.cast(pointers, ctypes.c_void_p).value, ctypes.cast(results, ctypes.c_void_p).value,
-        )  # fmt: skip
-
-    def _called(self, t: float, y: int, result: int) -> int:
-        try:
-            state = np.ctypeslib.as_array(ctypes.cast(y, ctypes.POINTER(ctypes.c_double)), (self.size,))
-            found = self(t, state.copy())
-            np.ctypeslib.as_array(ctypes.cast(result, ctypes.POINTER(ctypes.c_double)), found.shape)[:] = found
-        except BaseException as error:  # it cannot pass through C; `raise_pending` raises it on the other side
-            self._error = error
-            return 1
-        return 0
-
-    def raise_pending(self) -> None:
-        """Raise what a Python function raised while C called it."""
-        error, self._error = self._error, None
-        if error is not None:
-            raise error
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,15 +71,15 @@ class Motion:
             np.intp
         )
         found = np.empty((flat.size, self.field.size))
-        library = _library()
-        if library is None or _only_python(self.field):
+        library = ode_library()
+        if library is None or only_python(self.field):
             for i, (moment, k) in enumerate(zip(flat, knot, strict=True)):
                 found[i] = ode_numpy.partial(self.field, self.t[k], self.y[k], float(moment) - self.t[k])
         else:
             work = np.empty(int(library.lie_codegen_ode_work(self.field.size, 0)))
             library.lie_codegen_ode_at(
-                ctypes.byref(self.field.record), *_pointers(self.t, self.y), ctypes.c_ssize_t(len(self.t)), ctypes.c_ssize_t(flat.size),
-                *_pointers(flat, knot, self.allowed, found, work),
+                ctypes.byref(self.field.record), *pointers(self.t, self.y), ctypes.c_ssize_t(len(self.t)), ctypes.c_ssize_t(flat.size),
+                *pointers(flat, knot, self.allowed, found, work),
             )  # fmt: skip
             self.field.raise_pending()
         return found.reshape((*wanted.shape, self.field.size))
@@ -221,12 +115,12 @@ def integrate(
     tolerance = np.ascontiguousarray(np.broadcast_to(np.asarray(atol, dtype=float), y0.shape))
     if t0 == t1:
         return Motion(np.array([t0]), y0[None], REACHED, -1, 0, _allowed(y0[None], rtol, tolerance), rate)
-    library = _library()
-    if library is None or _only_python(rate, events):
+    library = ode_library()
+    if library is None or only_python(rate, events):
         found = ode_numpy.run(rate, y0, t0, t1, rtol, tolerance, events, directions, longest)
         return Motion(*found, _allowed(found[1], rtol, tolerance), rate)
     wanted = np.array([*directions, 0], dtype=np.intp)
-    rules = _Rules(rtol, tolerance.ctypes.data, 0.0, longest, wanted.ctypes.data, len(directions))
+    rules = Rules(rtol, tolerance.ctypes.data, 0.0, longest, wanted.ctypes.data, len(directions))
     work = np.empty(int(library.lie_codegen_ode_work(rate.size, len(directions))))
     none = ctypes.c_void_p(None)
     pieces_t, pieces_y, count, result = [np.array([t0])], [y0[None]], _FIRST_KNOTS, np.zeros(4)
@@ -236,7 +130,7 @@ def integrate(
         times[0], states[0] = pieces_t[-1][-1], pieces_y[-1][-1]
         status = library.lie_codegen_ode_run(
             ctypes.byref(rate.record), none if events is None else ctypes.byref(events.record), ctypes.byref(rules),
-            ctypes.c_double(t1), ctypes.c_ssize_t(count), *_pointers(times, states, work, result),
+            ctypes.c_double(t1), ctypes.c_ssize_t(count), *pointers(times, states, work, result),
         )  # fmt: skip
         for each in (rate, events):
             if each is not None:
@@ -264,13 +158,13 @@ def fixed_steps(rate: Field, start: ArrayLike, t0: float, h: float, spans: int, 
     """(spans + 1, n) states every `parts` steps of length h of the classical method of order 4, with f smooth or not."""
     states = np.empty((spans + 1, rate.size))
     states[0] = np.asarray(start, dtype=float).ravel()
-    library = _library()
-    if library is None or _only_python(rate):
+    library = ode_library()
+    if library is None or only_python(rate):
         return ode_numpy.fixed(rate, states, t0, h, parts)
     work = np.empty(6 * rate.size)
     library.lie_codegen_ode_fixed(
         ctypes.byref(rate.record), ctypes.c_double(t0), ctypes.c_double(h), ctypes.c_ssize_t(spans),
-        ctypes.c_ssize_t(parts), *_pointers(states, work),
+        ctypes.c_ssize_t(parts), *pointers(states, work),
     )  # fmt: skip
     rate.raise_pending()
     return states
@@ -278,44 +172,3 @@ def fixed_steps(rate: Field, start: ArrayLike, t0: float, h: float, spans: int, 
 
 def _allowed(y: Array, rtol: float, atol: Array) -> Array:
     return np.asarray(np.where(np.isinf(atol), 0.0, atol) + rtol * np.abs(y).max(axis=0))
-
-
-def _is_kernel(rate: Any) -> TypeGuard[Compiled[Any]]:
-    """Whether it is a compiled kernel, behind the extension type or not."""
-    return hasattr(rate, "signature") and hasattr(rate, "backend")
-
-
-def _filled(value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """A copy of its own, in C order, of a number or an array as one of a shape."""
-    array = np.array(value, dtype=float, order="C")
-    return array if array.shape == shape else np.array(np.broadcast_to(array, shape), order="C")
-
-
-def _only_python(*fields: Field | None) -> bool:
-    """Whether a kernel among them has no C: CasADi's interpreter is not to be called from C."""
-    return any(each is not None and _is_kernel(each.rate) and not each.address for each in fields)
-
-
-def _pointers(*arrays: Array | NDArray[np.intp]) -> list[ctypes.c_void_p]:
-    return [ctypes.c_void_p(np.ascontiguousarray(each).ctypes.data) for each in arrays]
-
-
-@lru_cache(maxsize=1)
-def _library() -> ctypes.CDLL | None:
-    """The compiled loops; None where there is no compiler."""
-
-    def files() -> dict[str, str]:
-        return {"ode.c": (template_folder() / "ode.c").read_text(encoding="utf-8"), **pair_headers(), **dense_headers()}
-
-    try:
-        path = build_source(files, "ode.c", namespace="lie_codegen_ode", definition="ode")
-    except CompileError:
-        return None
-    if path is None:
-        return None
-    library = load_library(path)
-    for name in ("run", "at", "fixed"):
-        library[f"lie_codegen_ode_{name}"].restype = ctypes.c_int
-    library.lie_codegen_ode_work.restype = ctypes.c_ssize_t
-    library.lie_codegen_ode_work.argtypes = [ctypes.c_ssize_t, ctypes.c_ssize_t]
-    return library

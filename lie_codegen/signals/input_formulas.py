@@ -120,6 +120,22 @@ def formula_of(entry: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     return exact_value(entry)
 
 
+def formulas_of(entries: Sequence[Any], parameters: Sequence[str]) -> list[sp.Expr]:
+    """Formulas with their parameters as symbols."""
+    symbols = {name: symbol_of(name) for name in parameters}
+    return [formula_of(entry, symbols) for entry in entries]
+
+
+def substituted(
+    entries: Sequence[Any], period: Any, parameters: Sequence[str], values: Mapping[str, Any]
+) -> tuple[tuple[sp.Expr, ...], sp.Expr]:
+    """Formulas and their period with numbers in place of some of the parameters, floats at their exact binary value."""
+    numbers = {symbol_of(name): exact_value(value) for name, value in values.items()}
+    symbols = {name: symbol_of(name) for name in parameters}
+    exact = tuple(formula.subs(numbers) for formula in formulas_of(entries, parameters))
+    return exact, period_of(period, symbols).subs(numbers)
+
+
 def period_of(value: Any, symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
     """A period given as text, number or SymPy expression in the given symbols.
 

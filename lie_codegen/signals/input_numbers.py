@@ -16,6 +16,7 @@ from lie_codegen.runtime.records import recalled
 from lie_codegen.signals.formula_tables import PieceTable, piece_table, series_formula
 from lie_codegen.signals.signal_values import PiecewiseValues, SeriesValues
 from lie_codegen.signals.waveform import SampledWaveform, Waveform
+from lie_codegen.values import Later
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,14 @@ class InputNumbers:
     series: FormulaInput | None
     lines: PieceTable | None
     breakpoints: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class KnownInput(Later):
+    """The formulas of an input whose numbers are known from before."""
+
+    waveform: Callable[[], Waveform]
+    numbers: InputNumbers
 
 
 def numbers_of(waveform: Waveform, breakpoints: tuple[float, ...]) -> InputNumbers:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, PeriodError, ShapeError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.expression import time_symbol
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
@@ -21,27 +21,23 @@ from lie_codegen.runtime.records import source_of
 from lie_codegen.signals.formula_tables import lines_between
 from lie_codegen.signals.input_formulas import (
     exact_value,
-    formula_of,
     formula_waveform,
+    formulas_of,
     fourier_formulas,
-    number_of,
     period_of,
     pieces_function,
     rows_of,
     series_through,
-    symbol_of,
+    substituted,
 )
-from lie_codegen.signals.input_numbers import InputNumbers, numbers_of, recalled_numbers
-from lie_codegen.signals.piecewise_waveform import piecewise_waveform
-from lie_codegen.signals.sampled_signal import Interpolated, Panels, resolve
-from lie_codegen.signals.trig_formula import NotTrigonometricError
-from lie_codegen.signals.waveform import SampledWaveform, TrigWaveform, Waveform
+from lie_codegen.signals.input_numbers import InputNumbers, KnownInput, numbers_of, recalled_numbers
+from lie_codegen.signals.input_pieces import Pieces, are_exact, pieces_waveform, read_pieces
+from lie_codegen.signals.input_waveform import integral_of, table_waveform, values_of
+from lie_codegen.signals.sampled_signal import resolve
+from lie_codegen.signals.waveform import TrigWaveform, Waveform
 from lie_codegen.values import Deferred, Later, settle
 
 __all__ = ["PeriodicInput"]
-
-#: (end, formulas) of each piece, as they were given.
-Pieces = tuple[tuple[Any, tuple[Any, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -93,7 +89,7 @@ class PeriodicInput(Saved):
             raise InputError(f"PeriodicInput: give a list of formulas, one a component, not {given!r}")
         settle(
             self,
-            components=given if isinstance(given, _Seen) else tuple(given),
+            components=given if isinstance(given, KnownInput) else tuple(given),
             period=period,
             parameters=(parameters,) if isinstance(parameters, str) else tuple(parameters),
             breakpoints=tuple(sorted(float(b) for b in breakpoints)),
@@ -104,7 +100,7 @@ class PeriodicInput(Saved):
         )
         if waveform is not None:
             settle(self, waveform=waveform, _numbers=numbers_of(waveform, tuple(self.breakpoints)))
-        if isinstance(given, _Seen):
+        if isinstance(given, KnownInput):
             settle(self, _numbers=given.numbers, _derive=given.waveform)
             return
         _ = self._numbers  # refuses what is no input
@@ -128,14 +124,9 @@ class PeriodicInput(Saved):
         if "_derive" in vars(self):
             return cast(Waveform, vars(self)["_derive"]())
         if self.pieces:
-            symbols = {name: symbol_of(name) for name in self.parameters}
-            ends = [number_of(end, "the end of a piece", {}) for end, _ in self.pieces]
-            formulas = [[formula_of(entry, symbols) for entry in row] for _, row in self.pieces]
-            return piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
+            return pieces_waveform(self.pieces, self.parameters)
         if self.table:
-            panels, values = Panels(self.table[0]), self.table[1]
-            function = self.function or Interpolated(panels, values)
-            return SampledWaveform(panels, values, function, period_of(self._given_period, {}))
+            return table_waveform(self.table, self._given_period, self.function)
         return formula_waveform(self.components, self._given_period, self.parameters, self.breakpoints)
 
     @property
@@ -228,10 +219,6 @@ class PeriodicInput(Saved):
         return _seen(source_of("pieces", given, parameters), exact, given)
 
     @property
-    def _named(self) -> dict[str, sp.Symbol]:
-        return {name: symbol_of(name) for name in self.parameters}
-
-    @property
     def dim(self) -> int:
         """n, the number of components."""
         return self._numbers.dim
@@ -319,12 +306,10 @@ class PeriodicInput(Saved):
                 )
         if not values:
             return self
-        numbers = {symbol_of(name): exact_value(value) for name, value in values.items()}
-        left = tuple(name for name in self.parameters if name not in values)
         if not isinstance(self.waveform, TrigWaveform):
             raise InputError("PeriodicInput.at: put the numbers into the formulas of an input in pieces")
-        components = tuple(formula_of(each, self._named).subs(numbers) for each in self.components)
-        period = period_of(self.period, self._named).subs(numbers)
+        left = tuple(name for name in self.parameters if name not in values)
+        components, period = substituted(self.components, self.period, self.parameters, values)
         return PeriodicInput(components, period, left, self.breakpoints)
 
     def linear(self, matrix: Any) -> PeriodicInput:
@@ -339,38 +324,19 @@ class PeriodicInput(Saved):
                 f"PeriodicInput.linear: the matrix has {exact.cols} columns, the input {self.dim} components"
             )
         if isinstance(self.waveform, TrigWaveform):
-            components = tuple(exact * sp.Matrix([formula_of(each, self._named) for each in self.components]))
+            components = tuple(exact * sp.Matrix(formulas_of(self.components, self.parameters)))
             return PeriodicInput(components, self.period, self.parameters, self.breakpoints)
         numeric = np.array(exact.tolist(), dtype=float)
         return PeriodicInput.from_callable(lambda t: self(t) @ numeric.T, self.period, breakpoints=self.breakpoints)
 
     @cached_property
     def _evaluate(self) -> Callable[[Array], Array]:
-        if self._numbers.values is not None:
-            return self._numbers.values
-        waveform = self.waveform
-        if isinstance(waveform, SampledWaveform):
-            length, dim = waveform.panels.period, self.dim
-            return lambda t: waveform.function(np.mod(t, length).ravel()).reshape(*t.shape, dim)
-        calculus, u = waveform.calculus({}, self.dim)
-        return waveform.evaluator(calculus, u, self.dim)
+        known = self._numbers.values
+        return values_of(self.waveform, self.dim) if known is None else known
 
     @cached_property
     def _integrate(self) -> Callable[[Array], Array]:
-        calculus, u = self.waveform.calculus({}, self.dim)
-        constant = calculus.mean(u)
-        wave = calculus.primitive(calculus.combine([(1, u), (-1, constant)]))
-        periodic = self.waveform.evaluator(calculus, wave, self.dim)
-        drift, omega = self.mean, float(self.waveform.omega)
-        return lambda t: periodic(t) / omega + t[..., None] * drift
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen(Later):
-    """The formulas of an input whose numbers are known from before."""
-
-    waveform: Callable[[], Waveform]
-    numbers: InputNumbers
+        return integral_of(self.waveform, self.dim, self.mean)
 
 
 def _seen(source: Any, exact: Callable[[], PeriodicInput], pieces: Pieces = ()) -> PeriodicInput:
@@ -381,7 +347,7 @@ def _seen(source: Any, exact: Callable[[], PeriodicInput], pieces: Pieces = ()) 
     if numbers.values is None:
         return exact()
     return PeriodicInput(
-        _Seen(lambda: exact().components, lambda: exact().waveform, numbers),  # type: ignore[arg-type]
+        KnownInput(lambda: exact().components, lambda: exact().waveform, numbers),  # type: ignore[arg-type]
         Later(lambda: exact().period),
         breakpoints=numbers.breakpoints,
         pieces=pieces,
@@ -390,26 +356,12 @@ def _seen(source: Any, exact: Callable[[], PeriodicInput], pieces: Pieces = ()) 
 
 def _in_pieces(given: Pieces, parameters: Sequence[str]) -> PeriodicInput:
     """The input of `from_pieces`, derived."""
-    symbols = {name: symbol_of(name) for name in parameters}
-    ends = [number_of(end, "the end of a piece", {}) for end, _ in given]
+    ends, formulas, symbols = read_pieces(given, parameters)
     moments = [float(end) for end in ends]
-    if not ends or any(b <= a for a, b in zip([0.0, *moments], moments, strict=False)):
-        raise InputError(f"PeriodicInput.from_pieces: the ends {moments} must increase from above 0")
-    formulas = [[formula_of(entry, symbols) for entry in entries] for _, entries in given]
-    if len({len(row) for row in formulas}) != 1:
-        raise ShapeError("PeriodicInput.from_pieces: every piece must have the same number of components")
     inside = tuple(moments[:-1])
-    names = ("in pieces",) * len(formulas[0])
-    try:
-        piecewise_waveform(ends, formulas, time_symbol(), tuple(symbols.values()))
-        return PeriodicInput(names, ends[-1], tuple(symbols), inside, pieces=given)
-    except (NotTrigonometricError, PeriodError):
-        free = set().union(*(f.free_symbols for row in formulas for f in row)) - {time_symbol()}
-        if free:
-            raise InputError(
-                f"PeriodicInput.from_pieces: the parameters {', '.join(sorted(map(str, free)))} need pieces that are "
-                "polynomials in t with sines and cosines of commensurate rates"
-            ) from None
+    if are_exact(ends, formulas, symbols):
+        names = ("in pieces",) * len(formulas[0])
+        return PeriodicInput(names, ends[-1], tuple(parameters), inside, pieces=given)
     return PeriodicInput.from_callable(pieces_function(moments, formulas), ends[-1], breakpoints=inside)
 
 

@@ -26,6 +26,9 @@ from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.start import placed, seen_from
 from lie_codegen.steering.task import make_task
 
+#: What is no option of a method.
+_TASK = ("group", "target", "controls", "duration", "method", "tolerance", "unknown")
+
 
 @shows_progress
 def steer(
@@ -181,69 +184,12 @@ def steer(
         InfeasibleError: no controls within the bounds reach the target: proved, see `.certificate`.
         SteeringError: the solver found nothing admissible; says what was tried, `.best` and `.violation`.
     """
+    given = locals().copy()  # every argument by its name, before another local is made
     group = as_group(group, "steer")
     if unknown:
         known = set(inspect.signature(steer).parameters) - {"unknown"}
         raise SteeringInputError(unknown_keywords(f"steer({group.name})", unknown, known))
-    options = {
-        name: value
-        for name, value in {
-            "start": start,
-            "drift": drift,
-            "bounds": bounds,
-            "rate_bounds": rate_bounds,
-            "velocity_bounds": velocity_bounds,
-            "weights": weights,
-            "objective": objective,
-            "longest": longest,
-            "obstacles": obstacles,
-            "classes": classes,
-            "via": via,
-            "rest": rest,
-            "periodic": periodic,
-            "dynamics": dynamics,
-            "inertia": inertia,
-            "start_velocity": start_velocity,
-            "end_velocity": end_velocity,
-            "intervals": intervals,
-            "pieces": pieces,
-            "starts": starts,
-            "rounds": rounds,
-            "iterations": iterations,
-            "seed": seed,
-            "guess": guess,
-            "polish": polish,
-            "equation": equation,
-            "spread": spread,
-            "vertices": vertices,
-            "solver": solver,
-            "cost": cost,
-            "terminal_cost": terminal_cost,
-            "constraints": constraints,
-            "parameters": parameters,
-            "quadrature": quadrature,
-            "integrator": integrator,
-            "form": form,
-            "q": q,
-            "amplitude": amplitude,
-            "harmonics": harmonics,
-            "order": order,
-            "cycles": cycles,
-            "forces": forces,
-            "damping": damping,
-            "compare": compare,
-            "exact": exact,
-            "threads": threads,
-            "steps": steps,
-            "planner": planner,
-            "gain": gain,
-            "disturbance": disturbance,
-            "noise": noise,
-            "step_options": step_options,
-            "progress": progress,
-        }.items()
-        if value is not None
-    }
+    options = {name: value for name, value in given.items() if name not in _TASK and value is not None}
     check_options(f"steer({group.name})", method, options)
     plan = _found(group, target, controls, duration, method, tolerance, options)
     if isinstance(target, GoalSet) or np.shape(target) != (group.degree, group.degree):

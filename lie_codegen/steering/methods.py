@@ -8,8 +8,8 @@ from importlib import import_module
 from typing import Any
 
 from lie_codegen.errors import SteeringInputError
-from lie_codegen.steering.optimal import optimal
 from lie_codegen.steering.plan import Plan
+from lie_codegen.steering.shooting.method import optimal
 from lie_codegen.steering.task import Task
 
 Method = Callable[..., Plan]

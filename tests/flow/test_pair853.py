@@ -12,7 +12,8 @@ from scipy.linalg import expm
 import lie_codegen as lc
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow import pair853
-from lie_codegen.flow.pair853 import System, integrate
+from lie_codegen.flow.pair853 import integrate
+from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import product_rate, reach_of, turning
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack

@@ -11,7 +11,7 @@ from lie_codegen.errors import ComputationError, ExpressionError, InputError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.numpy_arithmetic import evaluate
 from lie_codegen.rigid_body.elliptic_kernels import elliptic_kernels
-from lie_codegen.rigid_body.euler_average import euler_average, nodes_for
+from lie_codegen.rigid_body.euler_average import euler_average
 from lie_codegen.rigid_body.euler_equilibria import (
     limit_cycle_gains,
     limit_cycles,
@@ -21,6 +21,7 @@ from lie_codegen.rigid_body.euler_equilibria import (
 from lie_codegen.rigid_body.euler_solutions import explicit_inertia_change, solve_actual, solve_averaged
 from lie_codegen.rigid_body.euler_variational import moving_parts
 from lie_codegen.rigid_body.free_rigid_body import free_rigid_body
+from lie_codegen.rigid_body.phase_quadrature import nodes_for
 from lie_codegen.rigid_body.principal_body import TAU
 
 SIGNS = [s for s in itertools.product((1, -1), repeat=3) if s[0] * s[1] * s[2] == -1]

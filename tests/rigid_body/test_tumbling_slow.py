@@ -10,7 +10,8 @@ import lie_codegen as lc
 from lie_codegen.averaging.orbit_kernels import kernel_orbit_kernels
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.kernel.arithmetic import FloatArithmetic
-from lie_codegen.runtime.ode import Field, integrate
+from lie_codegen.runtime.ode import integrate
+from lie_codegen.runtime.ode_field import Field
 
 START, OMEGA, BODY = Rotation.from_rotvec([0.3, -0.5, 0.9]).as_matrix(), (0.3, 0.4, 0.9), (3, 4, 5)
 #: Damped, spun about the third axis, and shaken across it until w1 is large: it goes on tumbling.

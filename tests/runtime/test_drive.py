@@ -49,7 +49,7 @@ def probe() -> Library:
 def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """With the compiled loop, and without it."""
     if request.param == "numpy":
-        monkeypatch.setattr(drive, "_library", lambda: None)
+        monkeypatch.setattr(drive, "drive_library", lambda: None)
     return str(request.param)
 
 

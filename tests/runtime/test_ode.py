@@ -9,7 +9,8 @@ from scipy.special import ellipj
 import lie_codegen as lc
 from lie_codegen.errors import InputError
 from lie_codegen.runtime import ode
-from lie_codegen.runtime.ode import EVENT, REACHED, STUCK, Field, Motion, fixed_steps, integrate
+from lie_codegen.runtime.ode import EVENT, REACHED, STUCK, Motion, fixed_steps, integrate
+from lie_codegen.runtime.ode_field import Field
 
 
 def euler_top(ops, y, t):
@@ -25,7 +26,7 @@ def top():
 @pytest.fixture(params=["C", "numpy"])
 def loops(request, monkeypatch):
     if request.param == "numpy":
-        monkeypatch.setattr(ode, "_library", lambda: None)
+        monkeypatch.setattr(ode, "ode_library", lambda: None)
 
 
 @pytest.mark.usefixtures("loops")

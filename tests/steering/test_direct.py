@@ -21,8 +21,8 @@ from lie_codegen.steering.direct.chain import end as chain_end
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.flight import fly, landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
-from lie_codegen.steering.direct.method import manoeuvre
 from lie_codegen.steering.direct.numpy_search import NumpySearch
+from lie_codegen.steering.direct.problem import manoeuvre
 from lie_codegen.steering.direct.programme import Settings
 
 SX, SY, SZ = np.array([[0, 1], [1, 0]]), np.array([[0, -1j], [1j, 0]]), np.diag([1, -1])

@@ -11,34 +11,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.arrays import Array
-from lie_codegen.errors import InfeasibleError, ShapeError, SteeringError, SteeringInputError
-from lie_codegen.flow.elements import group_element
-from lie_codegen.groups.matrix_group import MatrixGroup, require_group
-from lie_codegen.steering.constraints import Obstacle, box_limits, check_obstacles
+from lie_codegen.errors import InfeasibleError, SteeringInputError
+from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.steering.constraints import Obstacle, check_obstacles
 from lie_codegen.steering.direct.around import around
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces
 from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.guess import guessed
 from lie_codegen.steering.direct.least_time import least_time
-from lie_codegen.steering.direct.polish import Flown, PolishError, as_inputs, corrected, flown, polished, refined
-from lie_codegen.steering.direct.programme import Machine, Settings
-from lie_codegen.steering.direct.reach import require_reach
+from lie_codegen.steering.direct.outcome import not_found, plan_at_the_edge, smoother
+from lie_codegen.steering.direct.polish import as_inputs, corrected
+from lie_codegen.steering.direct.problem import check_options, manoeuvre, piece_count
+from lie_codegen.steering.direct.programme import Settings
 from lie_codegen.steering.direct.report import cost_of, plan_of
 from lie_codegen.steering.direct.robust import robust
-from lie_codegen.steering.direct.search import LARGE, Budget, Found, search
+from lie_codegen.steering.direct.search import LARGE, Budget, search
 from lie_codegen.steering.direct.switches import switched
-from lie_codegen.steering.direct.system import System, controls_of, velocity
-from lie_codegen.steering.goals import end_of
-from lie_codegen.steering.plan import Plan, Status
-from lie_codegen.steering.task import check_duration
+from lie_codegen.steering.plan import Plan
 
-_OBJECTIVES = ("energy", "fuel", "time", "none")
-_FUEL_TIMES = 4
 #: Steps of a descent on large groups, where each takes a tenth of a second.
 _LARGE_DESCENT = 40
 
@@ -106,7 +99,7 @@ def direct(
     """
     say = progress or (lambda line: None)
     began = time.perf_counter()
-    _check(objective, equation, starts, rounds, pieces, iterations, tolerance)
+    check_options(objective, equation, starts, rounds, pieces, iterations, tolerance)
     task = manoeuvre(group, target, controls, duration, drift, bounds, weights, start, equation)
     if obstacles and objective != "energy":
         raise SteeringInputError(
@@ -116,7 +109,7 @@ def direct(
     if objective == "time":
         limits = Settings(True, iterations, iterations)
         return least_time(task, target, tolerance, limits, starts, rounds, seed, longest, say, vertices)
-    count = _pieces(task) if pieces is None else pieces
+    count = piece_count(task) if pieces is None else pieces
     if obstacles is not None and len(checked := check_obstacles(group, obstacles)):
         guesses = guessed(task, guess, count)
         return around(task, target, checked, classes, tolerance, starts, rounds, iterations, seed, guesses, say)
@@ -126,14 +119,35 @@ def direct(
     proof = certificate(task)
     if proof is not None:
         raise InfeasibleError(f"steer({group.name}): infeasible: {proof}", certificate=proof)
+    settings, smooth = _settings(task, objective, iterations, polish)
+    budget = Budget(starts, rounds, count, seed, settings)
+    return _searched(task, target, objective, tolerance, budget, guess, smooth, say, began)
+
+
+def _settings(task: Manoeuvre, objective: str, iterations: int, polish: bool | None) -> tuple[Settings, bool]:
+    """How far a start descends, and whether controls become continuous."""
     settings = Settings(objective == "fuel", iterations, iterations)
-    large = group.dim > LARGE
-    polish = not large if polish is None else polish
+    if objective == "none":
+        return replace(settings, descend_iterations=0, wanted=1), False
+    large = task.system.group.dim > LARGE
     if large:
         settings = replace(settings, descend_iterations=min(_LARGE_DESCENT, iterations))
-    if objective == "none":
-        settings, polish = replace(settings, descend_iterations=0, wanted=1), False
-    budget = Budget(starts, rounds, count, seed, settings)
+    return settings, not large if polish is None else polish
+
+
+def _searched(
+    task: Manoeuvre,
+    target: Any,
+    objective: str,
+    tolerance: float,
+    budget: Budget,
+    guess: Any,
+    smooth: bool,
+    say: Callable[[str], None],
+    began: float,
+) -> Plan:
+    """The best of many starts: constant pieces, corrected on the true system, then continuous where that is as good."""
+    group, settings, count = task.system.group, budget.settings, budget.pieces
     solver = machine(group, task.controls)
     built = time.perf_counter()
     programme = constant_pieces(task, count)
@@ -141,13 +155,13 @@ def direct(
     if not found.arrived:
         edge = switched(task, found.near)
         if edge is not None:
-            return _at_the_edge(task, target, found, *edge, budget, tolerance, objective, began)
-        raise _not_found(task, target, found, budget, tolerance, began)
+            return plan_at_the_edge(task, target, found, *edge, budget, tolerance, objective, began)
+        raise not_found(task, target, found, budget, tolerance, began)
     u, best = corrected(task, solver, programme, found.u, found.variant, False, settings)
     blocks = as_inputs(task, u, False)
     discretisation = f"{count} constant pieces"
-    if polish:
-        best, discretisation = _smoother(task, solver, u, found, best, settings)
+    if smooth:
+        best, discretisation = smoother(task, solver, u, found, best, settings)
     say(f"the true system ends {best.miss:.2g} from the goal; {discretisation}")
     seconds = {"build": built - began, "solve": time.perf_counter() - built}
     details = {
@@ -157,7 +171,7 @@ def direct(
         "starts": found.starts,
         "reached": found.reached,
         "agree": found.agree,
-        "seed": seed,
+        "seed": budget.seed,
         "pieces": blocks,
         "pieces_cost": cost_of(task, blocks, objective),
         "pieces_peaks": blocks.peaks(),
@@ -170,155 +184,3 @@ def direct(
     if task.end.phases:
         details["phase"] = task.end.phases[found.variant]
     return plan_of(task, target, best, found.variant, tolerance, objective, details, seconds)
-
-
-def manoeuvre(
-    group: MatrixGroup,
-    target: Any,
-    controls: Sequence[Any],
-    duration: float,
-    drift: Any,
-    bounds: Any,
-    weights: ArrayLike | None,
-    start: ArrayLike | None,
-    equation: str,
-) -> Manoeuvre:
-    """The problem, checked.
-
-    Raises:
-        As `direct`.
-    """
-    require_group(group, "steer")
-    where = f"steer({group.name})"
-    check_duration(duration, where)
-    labels, directions = controls_of(group, controls, where)
-    free = velocity(group, np.zeros(group.dim) if drift is None else drift, f"{where}: drift")
-    eye = np.eye(group.degree, dtype=group.basis.dtype)
-    here = eye if start is None else group_element(group, start, f"{where}: start")
-    system = System(group, labels, directions, free, here, equation == "right")
-    end = end_of(group, target, f"{where}: target")
-    low, high = box_limits(labels, bounds, f"{where}: bounds")
-    w = np.ones(len(labels)) if weights is None else np.array(weights, dtype=float)
-    if w.shape != (len(labels),):
-        raise ShapeError(f"{where}: weights have shape {w.shape}; give one for each of {len(labels)} controls")
-    if not np.all(np.isfinite(w)) or np.any(w <= 0):
-        raise SteeringInputError(f"{where}: weights must be positive, got {w.tolist()}")
-    require_reach(system, float(duration), end)
-    return Manoeuvre(system, end, float(duration), low, high, w)
-
-
-def _smoother(
-    task: Manoeuvre, solver: Machine, u: Array, found: Found, before: Flown, settings: Settings
-) -> tuple[Flown, str]:
-    """Better controls than the constant pieces, if they keep to the goal as well: what was flown, in words."""
-    plain = f"{len(task.own(u))} constant pieces"
-    if settings.fuel:
-        finer, programme = refined(task, solver, u, found.variant, _FUEL_TIMES, settings)
-        _, now = corrected(task, solver, programme, finer, found.variant, False, settings)
-        pieces = len(now.inputs.first)
-        cheaper = now.inputs.integral_of_sizes(task.weights) < before.inputs.integral_of_sizes(task.weights)
-        good = cheaper and now.miss <= max(10 * before.miss, 1e-9)
-        return (now, f"{pieces} constant pieces") if good else (before, plain)
-    try:
-        nodes, programme, pieces = polished(task, solver, u, found.variant, found.cost, settings)
-    except PolishError:
-        return before, plain
-    _, now = corrected(task, solver, programme, nodes, found.variant, True, settings)
-    if now.miss <= max(10 * before.miss, 1e-9):
-        return now, f"continuous controls, linear on {pieces} pieces"
-    return before, plain
-
-
-def _at_the_edge(
-    task: Manoeuvre,
-    target: Any,
-    found: Found,
-    best: Flown,
-    variant: int,
-    budget: Budget,
-    tolerance: float,
-    objective: str,
-    began: float,
-) -> Plan:
-    """The plan of arcs whose ends moved: nothing cheaper was sought, at the edge of what can be reached there is next to no choice."""
-    arcs = len(best.inputs.first)
-    details = {
-        "winner": "direct, arcs with free ends",
-        "objective": objective,
-        "tried": (
-            *found.tried,
-            f"{arcs} arcs with free ends reach it from one of the nearest {len(found.near)} starts",
-        ),
-        "starts": found.starts,
-        "reached": 0,
-        "agree": 1,
-        "seed": budget.seed,
-        "pieces": best.inputs,
-        "pieces_cost": cost_of(task, best.inputs, objective),
-        "pieces_peaks": best.inputs.peaks(),
-        "discretisation": f"none: {arcs} arcs of constant controls",
-        "optimality": "not sought: equal pieces did not reach the goal, which lies at the edge of what the bounds allow",
-    }
-    if task.end.phases:
-        details["phase"] = task.end.phases[variant]
-    took = {"solve": time.perf_counter() - began}
-    return plan_of(task, target, best, variant, tolerance, objective, details, took, Status.SOLVED)
-
-
-def _not_found(
-    task: Manoeuvre, target: Any, found: Found, budget: Budget, tolerance: float, began: float
-) -> SteeringError:
-    """The error, with the nearest plan; it says what was tried and proves nothing."""
-    best = flown(task, found.u, found.variant, False)
-    details = {
-        "tried": found.tried,
-        "starts": found.starts,
-        "reached": 0,
-        "agree": 0,
-        "seed": budget.seed,
-        "objective": "none",
-    }
-    plan = plan_of(
-        task,
-        target,
-        best,
-        found.variant,
-        tolerance,
-        "energy",
-        details,
-        {"solve": time.perf_counter() - began},
-        Status.NOT_FOUND,
-    )
-    name = task.system.group.name
-    return SteeringError(
-        f"steer({name}): not found, which proves nothing: the nearest of {found.starts} starts ends {plan.error:.3g} from the goal "
-        f"({len(found.tried)} rounds, {budget.pieces} pieces, {budget.settings.reach_iterations} iterations, seed {budget.seed}); "
-        "it is in .best; more starts, more pieces or another seed may find one, wider bounds may make it possible",
-        best=plan,
-        violation=plan.violation,
-    )
-
-
-def _pieces(task: Manoeuvre) -> int:
-    """More where there are more equations a control."""
-    n, m = task.system.group.dim, task.controls
-    return max(48 if n <= 8 else 32, -(-4 * n // m))
-
-
-def _check(
-    objective: str, equation: str, starts: int, rounds: int, pieces: int | None, iterations: int, tolerance: float
-) -> None:
-    if objective not in _OBJECTIVES:
-        raise SteeringInputError(f"objective is one of {', '.join(_OBJECTIVES)}, got {objective!r}")
-    if equation not in ("left", "right"):
-        raise SteeringInputError(f'equation is "left" (X\' = X hat(u)) or "right" (X\' = hat(u) X), got {equation!r}')
-    for name, value in (
-        ("starts", starts),
-        ("rounds", rounds),
-        ("iterations", iterations),
-        ("pieces", 1 if pieces is None else pieces),
-    ):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-            raise SteeringInputError(f"{name} must be a whole number of at least 1, got {value!r}")
-    if not tolerance > 0:
-        raise SteeringInputError(f"tolerance must be positive, got {tolerance!r}")

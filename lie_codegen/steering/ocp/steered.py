@@ -298,7 +298,7 @@ def _by_label(group: MatrixGroup, controls: tuple[Any, ...], limits: Mapping[Any
 
 def _extremal(problem: OptimalControlProblem, goal: Array, duration: float) -> Plan | None:
     """The exact extremal of least energy without bounds, as a first guess; None where there is none."""
-    from lie_codegen.steering.optimal import optimal
+    from lie_codegen.steering.shooting.method import optimal
     from lie_codegen.steering.task import make_task
 
     law = problem.data.velocity

@@ -1,0 +1,70 @@
+"""The compiled loops of templates/pair853.c: their arguments as C reads them, and the library."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from typing import Any
+
+from lie_codegen.codegen.templates import template_folder
+from lie_codegen.errors import CompileError
+from lie_codegen.runtime.backend import load_library
+from lie_codegen.runtime.pair_headers import pair_headers
+from lie_codegen.runtime.sources import build_source
+
+#: Of the pair 8(5,3).
+STAGES = 12
+#: Results of a run: reached the end, more steps are wanted, no step is short enough, a state is no longer finite.
+DONE, FULL, STUCK, LOST = range(4)
+
+
+class Pair(ctypes.Structure):
+    """`struct pair` of templates/pair853.c."""
+
+    _fields_ = [
+        *((n, ctypes.c_void_p) for n in ("rate", "move", "rate_batch", "move_batch")),
+        *((n, ctypes.c_ssize_t) for n in ("members", "packed", "group", "size", "numbers")),
+        *((n, ctypes.c_void_p) for n in ("number", "number_stride")),
+        *((n, ctypes.c_double) for n in ("t", "t_low", "h", "rtol", "atol", "reach", "longest")),
+        *((n, ctypes.c_void_p) for n in ("X", "y", "times")),
+        *((n, ctypes.c_ssize_t) for n in ("count", "next", "row")),
+        *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y")),
+        *((n, ctypes.c_ssize_t) for n in ("room", "knots")), ("work", ctypes.c_void_p),
+        *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations")),
+    ]  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def pair_library() -> Any:
+    """pair853.c, loaded; None where there is no compiler."""
+
+    def files() -> dict[str, str]:
+        text = (template_folder() / "pair853.c").read_text(encoding="utf-8")
+        return {"pair853.c": text, **pair_headers()}
+
+    try:
+        path = build_source(files, "pair853.c", namespace="pair853", definition="pair853", more_flags=("-O3",))
+    except CompileError:
+        return None
+    if path is None:
+        return None
+    library, size, pointer = load_library(path), ctypes.c_ssize_t, ctypes.c_void_p
+    library.pair_run.restype, library.pair_run.argtypes = size, (pointer, size)
+    library.gauss_run.restype, library.gauss_run.argtypes = size, (pointer, size, size)
+    library.pair_within.restype, library.pair_within.argtypes = (
+        None,
+        (pointer, size, pointer, pointer, pointer, pointer),
+    )
+    return library
+
+
+def compiled_pair() -> Any:
+    """pair853.c, loaded.
+
+    Raises:
+        CompileError: there is no compiler.
+    """
+    library = pair_library()
+    if library is None:
+        raise CompileError("the pair 8(5,3) needs a C compiler")
+    return library

@@ -1,0 +1,76 @@
+"""X' = X hat(xi), y' = F(t, X, y) as two compiled kernels, and as the C of templates/pair853.c reads them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lie_codegen.arrays import Array
+from lie_codegen.flow.pair_library import STAGES, Pair, pair_library
+from lie_codegen.runtime.call import Compiled
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """What is integrated.
+
+    Attributes:
+        rate: kernel (X packed, y, t, numbers...) -> y', y = (Theta, xi, ...).
+        move: kernel (X packed, Theta) -> X exp(Theta), packed.
+        group: n, entries of Theta.
+        reach: |Theta| up to which a step may go.
+        numbers: the other inputs of the rate in its order, of all members (*shape) or one each (N, *shape).
+    """
+
+    rate: Compiled[Any]
+    move: Compiled[Any]
+    group: int
+    reach: float
+    numbers: tuple[Array, ...] = ()
+
+    @property
+    def packed(self) -> int:
+        """Doubles of X."""
+        return int(self.rate.inputs[0].size)
+
+    @property
+    def size(self) -> int:
+        """Doubles of y."""
+        return int(self.rate.inputs[1].size)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether compiled loops can call it."""
+        return bool(self.rate.backend.address(many=False)) and pair_library() is not None
+
+    def of_members(self, which: Any) -> System:
+        """That of some of the members."""
+        kept = [v[which] if self._is_own(k) else v for k, v in enumerate(self.numbers)]
+        return replace(self, numbers=tuple(kept))
+
+    def work(self, members: int) -> Array:
+        """Room for a step of so many members, as templates/pair853.c lays it out."""
+        return np.empty(members * (self.size * (STAGES + 3) + 2 * self.packed + self.group))
+
+    def record(self, members: int) -> tuple[Pair, Sequence[Any]]:
+        """The system as the C reads it, and what has to stay."""
+        numbers = [np.ascontiguousarray(v, dtype=float) for v in self.numbers]
+        strides = [v[0].size if self._is_own(k) else 0 for k, v in enumerate(numbers)]
+        pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(v.ctypes.data for v in numbers))
+        moves = (ctypes.c_ssize_t * max(1, len(numbers)))(*strides)
+        rate, move = self.rate.backend, self.move.backend
+        single = members == 1
+        given = Pair(
+            rate=rate.address(many=False) if single else None, move=move.address(many=False) if single else None,
+            rate_batch=None if single else rate.address(many=True), move_batch=None if single else move.address(many=True),
+            members=members, packed=self.packed, group=self.group, size=self.size, numbers=len(numbers),
+            number=ctypes.addressof(pointers), number_stride=ctypes.addressof(moves),
+        )  # fmt: skip
+        return given, (numbers, pointers, moves)
+
+    def _is_own(self, k: int) -> bool:
+        return bool(self.numbers[k].ndim > len(self.rate.inputs[3 + k].shape))
