@@ -33,7 +33,10 @@ from lie_codegen.kernel.dual import (
     tangent_of,
 )
 from lie_codegen.kernel.linear import Matrix, identity, matmul, matvec, plus, transpose
+from lie_codegen.kernel.plain_data import NoDefinitionError
+from lie_codegen.kernel.records import record_definition
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.runtime.records import recalled
 
 _POINTS = 3
 _DIGITS = 50
@@ -60,7 +63,15 @@ class Compatibility(Saved):
 
 
 def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
-    """Checks (A2), and that phi is locally positive definite."""
+    """Checks (A2), and that phi is locally positive definite; what was found once for a pair is recalled from its record."""
+    try:
+        source = record_definition(error).text
+    except NoDefinitionError:  # a formula of functions that no text says: no record can name it
+        return _examined(error, seed)
+    return recalled("compatibility", [source, seed], Compatibility, lambda: _examined(error, seed))
+
+
+def _examined(error: ErrorFunction, seed: int) -> Compatibility:
     error, real = at_numbers(error), derivation_of(error.group).real
     rng = random.Random(seed)
     data = derivation_of(error.group).wei_norman
@@ -74,7 +85,7 @@ def compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
         ops = decimal_arithmetic(_DIGITS)
         points = [(_element(ops, data, rng), _element(ops, data, rng)) for _ in range(_POINTS)]
         residual = _residual(ops, error, real, points)
-        exact, compatible = False, residual < ops.constant(_TOLERANCE)
+        exact, compatible = False, bool(residual < ops.constant(_TOLERANCE))
     hessian = _hessian(ops, error, real)
     X = _rational(data, rng) if exact else _element(ops, data, rng)
     return Compatibility(compatible, exact, float(residual), _positive(ops, error, real, X, hessian), hessian)

@@ -76,6 +76,18 @@ def test_formulas_that_are_not_polynomial_are_checked_in_fifty_digits() -> None:
     assert not wrong.compatible
 
 
+def test_what_was_found_of_a_pair_is_recalled_from_its_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    pairs = [
+        lc.error_function("so3", f"exp(tr(1 - {product})) - 1", "right") for product in ("Xd'*X", "Xd'*X", "Xd^-1*X")
+    ]
+    found = compatibility(pairs[0], seed=7)
+    monkeypatch.setattr("lie_codegen.control.compatibility._residual", None)
+    assert compatibility(pairs[1], seed=7) == found
+    for another, seed in ((pairs[1], 8), (pairs[2], 7)):
+        with pytest.raises(TypeError):
+            compatibility(another, seed)
+
+
 def test_waypoints_through_the_front_door() -> None:
     se3 = lc.group("se3")
     points = [np.eye(4), expm(se3.hat([0.3, 0, 0.5, 1, 0, 0])), expm(se3.hat([0, 0.2, 1, 1, 1, 0.5]))]
