@@ -107,67 +107,46 @@ def deepest(graph: str, entry: str = "") -> int:
     return below(entry) if entry else max(map(below, own))
 
 
+def compile_core(name: str, controls: tuple[str | int, ...], lanes: int, level: str, folder: Path) -> str:
+    """The solver as the object core.o, with what gcc says of every function's stack."""
+    write(name, controls, folder)
+    source = [f"src/{name}_steer.c", "-o", "core.o"]
+    gcc("-std=c99", level, *width(lanes), "-Iinclude", "-fcallgraph-info=su", "-c", *source, folder=folder)
+    return (folder / "core.ci").read_text()
+
+
+def width(lanes: int) -> list[str]:
+    return ["-DLIE_CODEGEN_ONE_LANE"] if lanes == 1 else []
+
+
+def gcc(*arguments: str, folder: Path) -> None:
+    subprocess.run([str(COMPILER), *arguments], cwd=folder, check=True, capture_output=True)
+
+
 @pytest.mark.parametrize(("name", "controls", "lanes"), WIDTHS)
 @pytest.mark.parametrize(
     "level", ["-O0", "-O2", pytest.param("-O3", marks=pytest.mark.slow), pytest.param("-Os", marks=pytest.mark.slow)]
 )
-def test_what_gcc_says_is_below(
+def test_what_gcc_says_is_below_and_a_thread_of_that_stack_is_enough(
     name: str, controls: tuple[str | int, ...], lanes: int, level: str, tmp_path: Path
 ) -> None:
-    write(name, controls, tmp_path)
-    one = ["-DLIE_CODEGEN_ONE_LANE"] if lanes == 1 else []
-    command = [
-        str(COMPILER),
-        "-std=c99",
-        level,
-        *one,
-        "-Iinclude",
-        "-fcallgraph-info=su",
-        "-c",
-        f"src/{name}_steer.c",
-        "-o",
-        "x.o",
-    ]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-    graph = (tmp_path / "x.ci").read_text()
+    graph = compile_core(name, controls, lanes, level, tmp_path)
+    degree = lc.group(name).degree
     for entry, own in (("solve", False), ("solve_in", True)):
         found, said = deepest(graph, f"{name}_steer_{entry}"), stated(name, controls, lanes, own=own)
         # gcc does not see libm, for which the bound has a place too
         assert 0.25 * (said - LIBRARY) < found <= said, entry
-
-
-@pytest.mark.parametrize(("name", "controls", "lanes"), WIDTHS)
-@pytest.mark.parametrize("own", [False, True], ids=["on the stack", "in memory of the caller's"])
-def test_a_thread_of_the_stated_stack_is_enough(
-    name: str, controls: tuple[str | int, ...], lanes: int, own: bool, tmp_path: Path
-) -> None:
-    write(name, controls, tmp_path)
-    degree = lc.group(name).degree
-    # a thread's own control block and the program's start lie on the same stack
-    text = THREAD.replace("STACK", str(max(stated(name, controls, lanes, own=own) + 8192, 16384))).replace(
-        "FULL", str(degree * degree)
-    )
-    (tmp_path / "thread.c").write_text(
-        text.replace("DEGREE", str(degree)).replace("PREFIX", f"{name}_steer").replace("UPPER", f"{name}_steer".upper())
-    )
-    one = ["-DLIE_CODEGEN_ONE_LANE"] if lanes == 1 else []
-    command = [
-        str(COMPILER),
-        "-std=c99",
-        "-O1",
-        *one,
-        *(["-DOWN"] if own else []),
-        "-Iinclude",
-        "thread.c",
-        f"src/{name}_steer.c",
-        "-lm",
-        "-pthread",
-        "-o",
-        "thread",
-    ]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-    done = subprocess.run([tmp_path / "thread"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+        # a thread's own control block and the program's start lie on the same stack
+        text = THREAD.replace("STACK", str(max(said + 8192, 16384))).replace("FULL", str(degree * degree))
+        (tmp_path / "thread.c").write_text(
+            text.replace("DEGREE", str(degree))
+            .replace("PREFIX", f"{name}_steer")
+            .replace("UPPER", f"{name}_steer".upper())
+        )
+        options = ["-std=c99", *width(lanes), *(["-DOWN"] if own else []), "-Iinclude"]
+        gcc(*options, "thread.c", "core.o", "-lm", "-pthread", "-o", "thread", folder=tmp_path)
+        done = subprocess.run([tmp_path / "thread"], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, (entry, done.stdout)
 
 
 def test_the_readme_states_it() -> None:
