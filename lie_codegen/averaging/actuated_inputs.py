@@ -21,6 +21,10 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 def wheel_input(wheels: MomentumWheels, wheel_rates: PeriodicInput) -> PeriodicInput:
     """u = C theta', TR 93-59, (69): the body rate of wheel rates theta' (p components), exactly.
 
+    Args:
+        wheels: a body with p momentum wheels.
+        wheel_rates: theta', p components. [rad/s]
+
     Raises:
         ShapeError: if there are not p components.
     """
@@ -93,6 +97,9 @@ def oscillator_areas(x_dot: PeriodicInput) -> sp.ImmutableMatrix:
 
     Args:
         x_dot: the three rates of the oscillators over one period T.
+
+    Raises:
+        ArgumentError: x_dot is no `PeriodicInput`.
     """
     return areas(x_dot)
 

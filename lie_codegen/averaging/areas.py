@@ -17,7 +17,17 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 
 
 def areas(u: PeriodicInput) -> sp.ImmutableMatrix:
-    """(n, n) Area_ij = 1/2 int_0^T (ut_i u_j - ut_j u_i) dt, antisymmetric, ut = int_0^t u; exact where the input is. [u unit^2 time unit^2]"""
+    """Area_ij = 1/2 int_0^T (ut_i u_j - ut_j u_i) dt, ut = int_0^t u: the area of the loop, projected on the plane (i, j); TR 93-59, (21).
+
+    Args:
+        u: n components of period T.
+
+    Returns:
+        (n, n), antisymmetric; exact where the input is. [u unit^2 time unit^2]
+
+    Raises:
+        ArgumentError: u is no `PeriodicInput`.
+    """
     n = u.dim
     pairs = list(combinations(range(n), 2))
     brackets = {pair: {n + p: sp.S.One} for p, pair in enumerate(pairs)}
@@ -33,7 +43,17 @@ def areas(u: PeriodicInput) -> sp.ImmutableMatrix:
 
 
 def moments(u: PeriodicInput) -> sp.ImmutableDenseNDimArray:
-    """(n, n, n) m_ijk = 1/3 int_0^T (ut_i u_j - ut_j u_i) ut_k dt, antisymmetric in i and j; exact where the input is. [u unit^3 time unit^3]"""
+    """m_ijk = 1/3 int_0^T (ut_i u_j - ut_j u_i) ut_k dt, ut = int_0^t u: the first moments of the areas, of the third-order rate (area-moment rule).
+
+    Args:
+        u: n components of period T.
+
+    Returns:
+        (n, n, n), antisymmetric in i and j; exact where the input is. [u unit^3 time unit^3]
+
+    Raises:
+        ArgumentError: u is no `PeriodicInput`.
+    """
     n = u.dim
     pairs = list(combinations(range(n), 2))
     dim = n + len(pairs)

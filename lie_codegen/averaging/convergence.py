@@ -53,8 +53,13 @@ class Convergence(Saved):
 def convergence(group: GroupLike, u: PeriodicInput, eps: float) -> Convergence:
     """The convergence conditions of the Magnus series of X' = eps X hat(u).
 
+    Args:
+        group: object, catalogue name or file.
+        u: n components, over one period.
+        eps: the small parameter, positive.
+
     Raises:
-        InputError: if eps is not positive.
+        InputError: if eps is not positive and finite.
     """
     group = as_group(group, "convergence")
     if not 0 < eps < np.inf:

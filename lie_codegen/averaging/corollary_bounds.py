@@ -24,7 +24,17 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 
 
 def corollary_bound(delta: ArrayLike) -> NDArray[np.float64]:
-    """9 |cos delta - 1| + 7 |sin delta| + sin^2 delta: (...) of angles delta (...) [rad]."""
+    """9 |cos delta - 1| + 7 |sin delta| + sin^2 delta, which bounds |Xbar^-1 X - I|_1 by the bound of the angle: TR 93-59, Corollaries 1 and 2.
+
+    Args:
+        delta: (...) angles. [rad]
+
+    Returns:
+        (...) bounds of the sum of the absolute entries.
+
+    Raises:
+        ArgumentError: delta is no number.
+    """
     d = np.asarray(delta, dtype=float)
     return np.asarray(9 * np.abs(np.cos(d) - 1) + 7 * np.abs(np.sin(d)) + np.sin(d) ** 2)
 
@@ -60,10 +70,18 @@ def corollary_check(
     eps: Sequence[float] = (0.2, 0.1, 0.05),
     horizon: float = 2.5,
 ) -> BoundCheck:
-    """Corollary 1 (order 1, any mean) or 2 (order 2, u_av = 0) on rotations of space.
+    """Corollary 1 (order 1, any mean) or 2 (order 2, u_av = 0) on rotations of space: of the actual and the averaged motion over 0 <= eps t <= horizon.
+
+    Args:
+        group: so3, or a group with its definition.
+        u: three components, periodic.
+        order: 1 or 2, of the average.
+        eps: scales, each of which is simulated.
+        horizon: of eps t. [time unit]
 
     Raises:
-        InputError: on another group.
+        InputError: on another group; eps or horizon that are no positive numbers, or more periods than are simulated.
+        AssumptionError: order 2 of an input with a mean.
         ChartError: if the coordinates leave |g_2| < pi / 2, where the corollaries say nothing.
     """
     group = as_group(group, "corollary_check")

@@ -230,6 +230,12 @@ def feedback_average(
 ) -> FeedbackAverage:
     """Average the feedback u(t, g), n formulas in t, g1 .. gn and the parameters.
 
+    Args:
+        group: object, catalogue name or file; g are its Wei-Norman coordinates.
+        u: n texts or SymPy expressions, sums of sines and cosines in t with coefficients in g.
+        period: T, a number or a formula of the parameters. [time unit]
+        parameters: names that stay symbols.
+
     Raises:
         ExpressionError: a formula outside the grammar, with the column.
         PeriodError: frequencies in t without that period.

@@ -89,6 +89,11 @@ def magnus(group: GroupLike, u: PeriodicInput, order: int) -> Magnus:
 
     It converges for t up to a limit only: see `convergence`. For times of order 1 / eps use `average`.
 
+    Args:
+        group: object, catalogue name or file.
+        u: n components, sums of sines and cosines.
+        order: 1 to 12, the power of eps of the last term.
+
     Raises:
         InputError: an order that is not 1 to 12, or a sampled input (its secular terms are not periodic).
         ShapeError: if u has not n components.

@@ -33,6 +33,11 @@ class VibrationLine(Saved):
     Attributes:
         omega: angular frequency, positive. [rad/s]
         cosine, sine: (n,) amplitudes of the velocity components. [u unit]
+
+    Raises:
+        InputError: omega is not positive and finite.
+        ShapeError: cosine and sine have different lengths.
+        NotFiniteError: an amplitude is NaN or infinite.
     """
 
     omega: float
@@ -50,7 +55,11 @@ class VibrationLine(Saved):
 
 
 def line_drift(group: GroupLike, lines: Sequence[VibrationLine]) -> Array:
-    """(n,) mean velocity caused by the lines: sum [c, s] / (2 omega). Lines of one frequency must be given as one.
+    """(n,) mean velocity caused by the lines: sum [c, s] / (2 omega). [u unit^2 / (rad/s)]
+
+    Args:
+        group: object, catalogue name or file.
+        lines: `VibrationLine`s of n components; lines of one frequency must be given as one.
 
     Raises:
         ShapeError: amplitudes that have not n components.
@@ -70,9 +79,10 @@ def line_drift(group: GroupLike, lines: Sequence[VibrationLine]) -> Array:
 
 
 def spectral_drift(group: GroupLike, omega: ArrayLike, density: ArrayLike) -> Array:
-    """(n,) mean velocity caused by a stationary vibration with cross-spectral density S.
+    """(n,) mean velocity caused by a stationary vibration with cross-spectral density S: the sum of `line_drift` made an integral.
 
     Args:
+        group: object, catalogue name or file.
         omega: (k,) increasing positive angular frequencies. [rad/s]
         density: (k, n, n) Hermitian S_ij(omega), one-sided. [u unit^2 s / rad]
 

@@ -10,7 +10,6 @@ import typer
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
 from lie_codegen.cli.steering_texts import limits_of, numbers, obstacle_ball, obstacle_cone, target_of, via_point
-from lie_codegen.errors import write_refusal
 
 _Optional = typer.Option
 _LIMITS = "one number, low:high, or label=either, comma-separated."
@@ -128,13 +127,6 @@ def steer(
         data["picture"] = plot_plan(plan, picture, obstacles=obstacles).resolve()
         text += f"\npicture: {data['picture']}"
     if save is not None:
-        data["saved"] = _saved(plan, save)
+        data["saved"] = plan.save(save).resolve()
         text += f"\nsaved: {data['saved']}"
     emit(text, data, json)
-
-
-def _saved(plan: Any, path: Path) -> Path:
-    try:
-        return Path(plan.save(path)).resolve()
-    except OSError as error:
-        raise write_refusal(f"--save {path}", error) from None

@@ -29,7 +29,7 @@ from lie_codegen.control.force_limits import read_limits
 from lie_codegen.control.invariance import invariance
 from lie_codegen.control.level_search import LevelSearch
 from lie_codegen.control.tracking_law import FEEDFORWARDS
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -124,6 +124,8 @@ def certificate(
     L = points.L if pair.constant is None else min(points.L, pair.constant)
     metric, samples = Metric(group, body), error_samples(pair)
     if state is not None:
+        if len(state) != 4:
+            raise ShapeError(f"certificate: state is (X, xi, X_d, xi_d), given {len(state)} entries")
         now = loop_state(pair, body, *state)
         level, speed = now.W, max(speed, now.speed)
     level = _level(level, L, pair)

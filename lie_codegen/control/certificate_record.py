@@ -13,10 +13,10 @@ from lie_codegen.control.critical_points import CriticalPoints
 from lie_codegen.control.descent import comes_home
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples
-from lie_codegen.errors import ShapeError
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.shapes import shaped
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,7 +84,11 @@ class Certificate(Saved):
         return self.error.group
 
     def W(self, X: ArrayLike, xi: ArrayLike, X_d: ArrayLike, xi_d: ArrayLike) -> float:
-        """phi + |xi_e|_I^2/2 at a state.
+        """W = phi + |xi_e|_I^2/2 at a state, xi_e = xi less the transported xi_d.
+
+        Args:
+            X, xi: (d, d) and (n,), the configuration and its body velocity.
+            X_d, xi_d: (d, d) and (n,), those of the reference.
 
         Raises:
             ShapeError, NotOnGroupError: an element or a velocity that is none.
@@ -96,6 +100,9 @@ class Certificate(Saved):
 
         True: W <= level, and all conditions of Theorem 4.2 hold. False: W >= L, and no path downhill from X leads to the reference below a
         mountain pass. None where nothing is known: between, for a faster or farther reference, or where critical points may be missing.
+
+        Args:
+            X, xi, X_d, xi_d: as in `W`.
 
         Raises:
             ShapeError, NotOnGroupError: an element or a velocity that is none.
@@ -136,16 +143,9 @@ def loop_state(
     samples = error_samples(pair)
     phi, _ = samples.first(here[None], there[None])
     P, _ = samples.transport(here[None], there[None])
-    nu = P[0] @ _vector(xi_d, pair.group.dim, "xi_d")
-    error = _vector(xi, pair.group.dim, "xi") - nu
+    nu = P[0] @ shaped(xi_d, (pair.group.dim,), "xi_d")
+    error = shaped(xi, (pair.group.dim,), "xi") - nu
     back = np.linalg.inv(there)
     E = here @ back if pair.transport == "left" else back @ here
     far = float(max(np.max(np.abs(there)), np.max(np.abs(back))))
     return LoopState(float(phi[0] + error @ inertia @ error / 2), float(np.sqrt(nu @ inertia @ nu)), far, E)
-
-
-def _vector(value: ArrayLike, size: int, name: str) -> Array:
-    array = np.asarray(value, dtype=float)
-    if array.shape != (size,):
-        raise ShapeError(f"certificate: {name} has shape {array.shape}; give ({size},)")
-    return array

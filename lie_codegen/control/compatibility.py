@@ -104,11 +104,16 @@ def _in_floats(error: ErrorFunction, real: RealMatrices, data: WeiNormanData, rn
 
 
 def check_compatibility(error: ErrorFunction, seed: int = 0) -> Compatibility:
-    """The same, or an error.
+    """`compatibility` of an error function, or an error that says what fails: d_2 phi + P^T d_1 phi = 0, (A2), and phi positive definite.
+
+    Args:
+        error: of `error_function` or the catalogue.
+        seed: of the random points at which (A2) is tried.
 
     Raises:
         IncompatibleError: (A2) fails; carries the residual.
         InputError: phi is not positive definite near the diagonal.
+        ExpressionError: phi cannot be evaluated.
     """
     try:
         found = compatibility(error, seed)

@@ -45,7 +45,14 @@ _ROWS = {
 
 
 def error_names(group: GroupLike) -> tuple[str, ...]:
-    """The names of Bullo and Murray's pairs that `catalogue_error` knows for a group; it knows "geodesic" on every group besides."""
+    """The names of Bullo and Murray's pairs that `catalogue_error` knows for a group; it knows "geodesic" on every group besides.
+
+    Args:
+        group: object, catalogue name or file.
+
+    Raises:
+        UnknownGroupError: no such group.
+    """
     group = as_group(group, "error_names")
     names = ["frobenius"]
     kind = _kind(group)

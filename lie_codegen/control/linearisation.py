@@ -36,7 +36,13 @@ class LinearLoop(Saved):
 
 
 def linear_loop(group: GroupLike, *, inertia: Any, error: Any, gains: Mapping[str, Any]) -> LinearLoop:
-    """The linearisation of `tracking_law` with the same arguments; every feedforward has the same.
+    """The linearisation I xi_e' = -K_d xi_e - H eta at rest of `tracking_law` with the same arguments; every feedforward has the same.
+
+    Args:
+        group: object, catalogue name or file.
+        inertia: symmetric positive definite: a number, (n,) or (n, n).
+        error: as in `tracking_law`; H is its Hessian at the reference.
+        gains: K_d and those of the error function.
 
     Raises:
         InputError: as `tracking_law`.

@@ -18,7 +18,7 @@ from lie_codegen.control.loop_times import error_goal, is_number, read_times, sa
 from lie_codegen.control.plants import GroupPlant, Plant, group_plant
 from lie_codegen.control.reference_kernels import reference as make_reference
 from lie_codegen.control.space_plants import named_plant
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -179,8 +179,12 @@ def _plant(group: Any, law: LoopLaw | None, inertia: Any, gains: Mapping[str, An
     if law is None or law.order == 2 or (law.order is None and inertia is not None):
         if inertia is None and law is not None:
             inertia = _designed_for(law.kernel)
-        several = not isinstance(inertia, str) and np.ndim(inertia) == 3
-        return group_plant(group, "input") if several else _known_plant(group, plain(inertia))
+        n, shape = group.dim, () if isinstance(inertia, str) else np.shape(inertia)
+        if shape not in ((), (n,), (n, n)) and shape[1:] != (n, n):
+            raise ShapeError(
+                f"closed_loop: inertia has shape {shape}; give a number, ({n},), ({n}, {n}), or ({n}, {n}) for each of N loops: (N, {n}, {n})"
+            )
+        return group_plant(group, "input") if len(shape) == 3 else _known_plant(group, plain(inertia))
     if law.order is None:
         raise InputError(
             f"closed_loop: is {law.command.name} of the law {law.kernel.name} a velocity or a force? Name it omega or velocity, "

@@ -152,6 +152,12 @@ def _single(inertia: Any, n: int) -> Array:
     return value * np.eye(n) if value.ndim == 0 else np.diag(value) if value.ndim == 1 else value
 
 
+def _taken(port: Port) -> str:
+    """The shapes of a number of a loop: its own, and one a loop."""
+    sides = "".join(f", {n}" for n in port.shape)
+    return f"{port.shape or 'a number'}, or one for each of N loops: (N{sides or ','})"
+
+
 def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
     """The values of a number, one or one a loop: positive, or symmetric and positive definite, if that is wanted.
 
@@ -161,12 +167,10 @@ def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
     try:
         array = np.array(value, dtype=float, order="C")  # ascontiguousarray would make a number an array of one
     except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"closed_loop: {port.name} is {shown(value)}; give {port.shape} or (N, *{port.shape})"
-        ) from None
+        raise InputError(f"closed_loop: {port.name} is {shown(value)}; give {_taken(port)}") from None
     ranks = (len(port.shape), len(port.shape) + 1)
     if array.ndim not in ranks or array.shape[array.ndim - len(port.shape) :] != port.shape:
-        raise ShapeError(f"closed_loop: {port.name} has shape {array.shape}; give {port.shape} or (N, *{port.shape})")
+        raise ShapeError(f"closed_loop: {port.name} has shape {array.shape}; give {_taken(port)}")
     if not np.all(np.isfinite(array)):
         raise NotFiniteError(f"closed_loop: {port.name} holds NaN or infinity")
     if not positive:

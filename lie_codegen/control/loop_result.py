@@ -65,7 +65,13 @@ class ClosedLoop(Saved):
         return loop_error(self.group, self.X, self.X_d)
 
     def at(self, t: ArrayLike) -> tuple[Array, Array]:
-        """(X, xi) at other times of a single loop, (d, d) and (n,), or (k, d, d) and (k, n): by fresh steps, as exact as the run.
+        """(X, xi) of a single loop at other times: by fresh steps, as exact as the run.
+
+        Args:
+            t: one time or (k,) times within the run.
+
+        Returns:
+            (d, d) and (n,), or (k, d, d) and (k, n).
 
         Raises:
             InputError: a time outside the run; several loops; a run by equal steps; one from a file whose law was written by
@@ -88,6 +94,11 @@ class ClosedLoop(Saved):
 
     def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:
         """The law as C with <name>_loop.c, which runs the first loop without noise, as `lc.generate(run, folder)` writes them.
+
+        Args:
+            name: of the package, the law's own if None.
+            real: "double" or "float".
+            form: as every thing that can be generated takes it; a loop has one form and does not read it.
 
         Raises:
             InputError: the loop has no law; or it is from a file, and its law was written by hand and has no definition.

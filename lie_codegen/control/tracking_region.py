@@ -9,18 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.control.certificate_record import loop_state
 from lie_codegen.control.claims import check_constant, is_claimed
 from lie_codegen.control.error_catalogue import as_error
-from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import attitude_gain, eigenvalues, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
-from lie_codegen.groups.derivation import derivation_of
-from lie_codegen.groups.maps.matrices import GroupMatrices
-from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.arithmetic import FloatArithmetic
-from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.saved import Saved
 
 
@@ -57,21 +52,20 @@ def tracking_region(
     On SE(n) rows 5 and 6 are quadratic only while |p| and |p_d| stay bounded: they converge, but the exponential
     rate falls with the distance from the origin (phi/|d phi|^2 grows as |p|^2).
 
+    Args:
+        group: object, catalogue name or file.
+        inertia, error, gains: as in `tracking_law`.
+        X, xi: (d, d) and (n,), the configuration and its body velocity.
+        X_d, xi_d: (d, d) and (n,), those of the reference.
+
     Raises:
         InputError: as `tracking_law`; phi is negative somewhere; a constant that was claimed is not valid.
+        ShapeError, NotOnGroupError: an element or a velocity that is none.
     """
     group = as_group(group, "tracking_region")
     pair = as_error(group, error, gains)
     metric = np.array(positive_matrix(inertia, group.dim, "inertia").tolist(), dtype=float)
-    real, ops = derivation_of(group).real, FloatArithmetic()
-    read = GroupMatrices(ops, real).read
-    at = ErrorDerivatives(ops, pair, real, read(_entries(group, X)), read(_entries(group, X_d)))
-    phi, _ = at.differential(1)
-    error_velocity = np.asarray(xi, dtype=float) - np.array(
-        at.transported([float(v) for v in np.asarray(xi_d)]), dtype=float
-    )
-    W = float(phi + error_velocity @ metric @ error_velocity / 2)
-    return _region(pair, W)
+    return _region(pair, loop_state(pair, metric, X, xi, X_d, xi_d).W)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,9 +113,3 @@ def _region(pair: ErrorFunction, W: float) -> TrackingRegion:
     if not inside:
         words = f"W = {W:.6g} is not below L = {bound:.6g}: outside the proved region, nothing is claimed"
     return TrackingRegion(W, bound, inside, words)
-
-
-def _entries(group: MatrixGroup, X: ArrayLike) -> list[list[Any]]:
-    if group.is_complex:
-        return [[Complex(float(z.real), float(z.imag)) for z in row] for row in np.asarray(X, dtype=complex)]
-    return [[float(x) for x in row] for row in np.asarray(X, dtype=float)]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.errors import ShapeError
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -95,9 +96,13 @@ def distance(group: GroupLike, X: ArrayLike, Y: ArrayLike) -> float:
         X, Y: (d, d) elements, which are not tested for being elements.
 
     Raises:
-        ArgumentError: matrices of another size.
+        ShapeError: matrices of another size.
     """
     group = as_group(group, "distance")
+    d = group.degree
+    for name, given in (("X", X), ("Y", Y)):
+        if np.shape(given) != (d, d):
+            raise ShapeError(f"distance: {name} has shape {np.shape(given)}; an element of {group.name} is ({d}, {d})")
     relative = np.linalg.solve(np.asarray(X), np.asarray(Y))
     x, off = matrix_log(group, relative)
     if off <= 1e-6:

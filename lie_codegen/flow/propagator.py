@@ -188,6 +188,10 @@ class Propagator(Saved):
     def batch(self, *, threads: int = 1, **parameters: ArrayLike) -> PropagationBatch:
         """X(T; p) where any of the parameters are (N,) arrays and the others numbers, eight at a time on lanes.
 
+        Args:
+            threads: that share the members; the result does not depend on it.
+            parameters: each by its name, a number or (N,).
+
         Raises:
             InputError: a parameter missing or unknown, a duration that depends on them.
             ShapeError: arrays of different lengths.
@@ -218,6 +222,10 @@ class Propagator(Saved):
         """X(n T) = X(T)^n of a periodic input over one period, with its error.
 
         Squared and multiplied in extended precision, so that the error is that of X(T), n times.
+
+        Args:
+            n: how many periods, from 0 to 10^12.
+            parameters: each by its name, a number.
 
         Raises:
             InputError: n is no integer from 0 to 10^12, or the duration is not "period".

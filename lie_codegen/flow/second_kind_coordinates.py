@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import NotOnGroupError
+from lie_codegen.errors import NotOnGroupError, ShapeError
 from lie_codegen.flow.chart import mismatch, newton
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.flow.logarithm import matrix_log
@@ -36,10 +36,13 @@ def second_kind(group: GroupLike, X: ArrayLike) -> Array:
         X: (d, d) element; g is (n,).
 
     Raises:
+        ShapeError: X is not (d, d).
         NotOnGroupError: if none is found from 0, from log X, or from random starts.
     """
     group = as_group(group, "second_kind")
-    target = np.asarray(X)
+    target, d = np.asarray(X), group.degree
+    if target.shape != (d, d):
+        raise ShapeError(f"second_kind: X has shape {target.shape}; an element of {group.name} is ({d}, {d})")
     rng = np.random.default_rng(_SEED)
     starts = np.vstack([np.zeros(group.dim), matrix_log(group, target)[0], rng.uniform(-2, 2, (200, group.dim))])
     found = _damped(group, starts, target)

@@ -44,6 +44,7 @@ class Trajectory(Saved):
         events: what was found of each event, in their order.
         drive: u as it was integrated, plain data.
         rtol: the tolerance, relative to max(1, |X|).
+        multiple: how many times the coarsest steps were divided; 0 for a number of steps that was given.
         g: (k, n) Wei-Norman coordinates with X = X0 exp(g_1 A_1) ... exp(g_n A_n), from g = 0 at t[0]; raises
             ChartError, naming the time, if the chart ends on the way.
         charts: the same with restarts: charts that cover the whole trajectory, see `restarts.Chart`.
@@ -70,10 +71,16 @@ class Trajectory(Saved):
         )
 
     def at(self, t: ArrayLike) -> Array:
-        """X at other times of the run: (d, d) of one, (k, d, d) of (k,); (N, d, d) and (k, N, d, d) of N trajectories.
+        """X at other times of the run.
 
         By fresh steps from the output time before, as fine as those of the run, u read at their own nodes: an interpolant
         of whole steps would be worse than the run.
+
+        Args:
+            t: one time or (k,) times within the run.
+
+        Returns:
+            (d, d) of one time, (k, d, d) of (k,); (N, d, d) and (k, N, d, d) of N trajectories.
 
         Raises:
             InputError: a time outside the run.

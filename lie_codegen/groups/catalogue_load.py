@@ -16,9 +16,10 @@ GroupLike = MatrixGroup | str | Path
 
 
 def group(name_or_path: GroupLike) -> MatrixGroup:
-    """The group of a catalogue name such as "so3" (or "SO(3)"), of a family such as "sl4", or of a group file (.toml).
+    """The group of a name or a file; a group is returned as it is.
 
-    A group is returned as it is.
+    Args:
+        name_or_path: a catalogue name such as "so3" (or "SO(3)"), of a family such as "sl4", a group file (.toml), or a `MatrixGroup`.
 
     Raises:
         UnknownGroupError: no such name; lists those there are.

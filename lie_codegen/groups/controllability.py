@@ -12,6 +12,10 @@ from lie_codegen.groups.catalogue_load import GroupLike, as_group
 def controllability(group: GroupLike, controls: Sequence[str | int]) -> Controllability:
     """Whether X' = X sum u_i A_i over the given controls reaches every X, with the growth vector; exact.
 
+    Args:
+        group: object, catalogue name or file.
+        controls: labels or positions of the actuated basis elements.
+
     Raises:
         InputError: an unknown or repeated control, or none.
     """

@@ -53,6 +53,11 @@ _ORDERS = {"wxyz": (0, 1, 2, 3), "xyzw": (3, 0, 1, 2)}
 def tangent_to(library: str, group: GroupLike, x: ArrayLike) -> Array:
     """Our tangent vectors (..., n) in the order of a library's own.
 
+    Args:
+        library: "manif", "sophus", "gtsam", ...; a name that is not known lists them.
+        group: object, catalogue name or file.
+        x: (..., n) in our order.
+
     Raises:
         InputError: a library or group the table does not have.
         ShapeError: the last axis is not n.
@@ -63,6 +68,11 @@ def tangent_to(library: str, group: GroupLike, x: ArrayLike) -> Array:
 
 def tangent_from(library: str, group: GroupLike, x: ArrayLike) -> Array:
     """A library's tangent vectors (..., n) in our order.
+
+    Args:
+        library: "manif", "sophus", "gtsam", ...: as `tangent_to` lists them where a name is not known.
+        group: object, catalogue name or file.
+        x: (..., n) in the library's order.
 
     Raises:
         InputError, ShapeError: as `tangent_to`.
@@ -97,7 +107,11 @@ def body_from_spatial(group: MatrixGroup, X: ArrayLike, s: ArrayLike) -> Array:
 
 
 def rotation_from_quaternion(q: ArrayLike, *, order: str | None = None) -> Array:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4) of any length but zero; `order` is "wxyz" or "xyzw".
+    """Rotation matrices (..., 3, 3) of quaternions.
+
+    Args:
+        q: (..., 4), of any length but zero.
+        order: "wxyz" or "xyzw"; it has to be said.
 
     Raises:
         InputError: no order or another, or a zero quaternion.
@@ -119,13 +133,17 @@ def rotation_from_quaternion(q: ArrayLike, *, order: str | None = None) -> Array
 
 
 def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array:
-    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), with w >= 0; `order` is "wxyz" or "xyzw".
+    """Unit quaternions (..., 4) of rotation matrices, with w >= 0.
 
     Of the rows of 4 q q^T the one with the largest diagonal entry is normalised, so that no digit is lost at any angle. At w = 0
     the component of largest modulus is positive. (Shepperd's choice.)
 
+    Args:
+        R: (..., 3, 3).
+        order: "wxyz" or "xyzw"; it has to be said.
+
     Raises:
-        InputError: another order.
+        InputError: no order or another.
         ShapeError: the last axes are not (3, 3).
         NotOnGroupError: a matrix is not a rotation to 1e-5; nearer ones, as in single precision, are projected.
     """

@@ -34,9 +34,11 @@ def from_matrices(
         matrices: (n) d x d matrices: nested sequences, numpy arrays or SymPy matrices of exact numbers: integers,
             Fractions, texts such as "1/2" or "sqrt(3)/2", SymPy numbers, floats with an exact binary value.
         units: (n,) units of the components, optional.
+        description: one line.
 
     Raises:
         IdentifierError, ShapeError (ragged), DependentBasisError, NotClosedError: naming the culprit.
+        InputError: matrices that are no list.
     """
     check_identifier(name, "name")
     labels = _labels(name, labels)
@@ -63,10 +65,15 @@ def from_brackets(
     """The group of an algebra given by brackets, in a faithful representation that the package finds.
 
     Args:
+        name: C identifier.
+        labels: (n,) basis names.
         brackets: {("a", "b"): {"c": 1}} for [a, b] = c; brackets not given are zero.
+        units: (n,) units of the components, optional.
+        description: one line.
 
     Raises:
         IdentifierError, AlgebraError, JacobiError: naming the culprit.
+        InputError: brackets that are no such mapping.
     """
     check_identifier(name, "name")
     labels = _labels(name, labels)

@@ -121,7 +121,17 @@ class MatrixGroup:
         return x
 
     def project(self, A: ArrayLike) -> Array:
-        """Coordinates of the element of the algebra nearest to A (Frobenius): (..., d, d) -> (..., n)."""
+        """Coordinates of the element of the algebra nearest to A (Frobenius).
+
+        Args:
+            A: (..., d, d), real or complex.
+
+        Returns:
+            (..., n).
+
+        Raises:
+            ArgumentError: the last axes are not (d, d).
+        """
         matrix = np.asarray(A, dtype=complex)
         flat = matrix.reshape(*matrix.shape[:-2], -1)
         return np.concatenate([flat.real, flat.imag], axis=-1) @ self.coordinate_rows.T
@@ -173,7 +183,7 @@ class MatrixGroup:
         description, which is of no account in comparisons, is not in it.
 
         Raises:
-            OSError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written.
         """
         from lie_codegen.kernel.saved import save_definition
 
@@ -194,7 +204,14 @@ class MatrixGroup:
 
     @classmethod
     def recorded(cls, record: Mapping[str, Any]) -> MatrixGroup:
-        """The group of which the record was taken; its exact basis is read when it is asked for."""
+        """The group of which the record was taken; its exact basis is read when it is asked for.
+
+        Args:
+            record: what `MatrixGroup.record` holds: definition, floats of the basis and of the structure constants, units, description.
+
+        Raises:
+            ArgumentError: it is no such record.
+        """
         definition = definition_of(record["definition"]["kind"], record["definition"]["parameters"])
         given = definition["parameters"]
         parts = [np.array(part) for part in record["basis"]]

@@ -29,6 +29,10 @@ def gradient(
 ) -> Kernel:
     """The derivative (n,) of a scalar output by one input, as `jacobian` gives it: the same inputs -> d<output>_d<port>.
 
+    Args:
+        kernel, port, tangent, group, name: as in `jacobian`.
+        output: the real scalar output, the first if not given.
+
     Raises:
         InputError: the output is no real scalar; otherwise as `jacobian`.
         ShapeError: as `jacobian`.

@@ -33,6 +33,10 @@ class Port:
         is_complex: complex entries; C sees them interleaved (re, im), as numpy's complex128 lies in memory.
         description: one line for the generated documentation.
         any_sign: of a number of a law that is an input: zero and negative values are allowed too, as of an offset or a coefficient.
+
+    Raises:
+        IdentifierError: name is no C identifier.
+        ShapeError: a shape with more than two sides, or one below 1.
     """
 
     name: str
@@ -71,6 +75,10 @@ class Kernel:
         source: where the formula comes from, with its equation number.
         sampler: admissible inputs for test vectors; uniform in [-1, 1] when None.
         definition: what it is, as plain data: kind, exact parameters, records; None for one written by hand.
+
+    Raises:
+        IdentifierError: name or symbol is no C identifier.
+        InputError: two ports of one name, or no output.
     """
 
     name: str
@@ -118,7 +126,14 @@ class Kernel:
         return self.name, self.namespace, self.inputs, self.outputs, self.formula, self.source
 
     def defined_by(self, definition: Definition) -> Kernel:
-        """The same with its definition, which must determine it."""
+        """The same kernel with its definition, which must determine it.
+
+        Args:
+            definition: plain data, from which equality, hash and pickle follow.
+
+        Returns:
+            A new kernel; this one stays as it is.
+        """
         made = replace(self)
         settle(made, definition=definition)
         return made
@@ -146,7 +161,7 @@ class Kernel:
 
         Raises:
             InputError: it was written by hand or by a factory of the user's; those pickle.
-            OSError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written.
         """
         from lie_codegen.kernel.saved import save_definition  # what reads and writes files is imported by whoever saves
 
@@ -158,11 +173,20 @@ class Kernel:
         return f"{self.namespace}_{self.name}"
 
     def evaluate(self, ops: Arithmetic, *arguments: Any) -> tuple[Any, ...]:
-        """Run the body in the given arithmetic."""
+        """Run the body in the given arithmetic; nothing is checked, for it runs inside others.
+
+        Args:
+            ops: exact, float, numpy, CasADi ...: see `lie_codegen.kernel.arithmetic`.
+            arguments: one value a port, in their order: a scalar, a list of n, or a list of rows.
+        """
         return self.body(ops, *arguments)
 
     def sample(self, rng: random.Random) -> tuple[Any, ...]:
-        """One admissible value for each input."""
+        """One admissible value for each input.
+
+        Args:
+            rng: of Python's `random`, where its random numbers come from.
+        """
         return self.sampler(rng) if self.sampler else tuple(uniform_sample(port, rng) for port in self.inputs)
 
 

@@ -118,6 +118,13 @@ def accessibility_rank(
     In the left trivialisation fields are pairs (a, A) of polynomials of xi, and
     [(a, A), (b, B)] = ([a, b] + Db A - Da B, DB A - DA B).
 
+    Args:
+        group: object, catalogue name, file, or its `LieAlgebra`.
+        inertia: symmetric positive definite: a number, (n,) or (n, n), exact.
+        forces: (m, n) covectors, exact.
+        xi: (n,) the velocity at which; zero if not given.
+        depth: brackets of fields with the given ones, from 0 to 12 times.
+
     Raises:
         ShapeError: a force or xi has not n entries.
         InputError: a depth outside 0 to 12.
@@ -165,6 +172,12 @@ def direction_observability(
     Section 9 of Geyer's paper lets omega be seen "if the body is not symmetric", through omega x I omega (printed
     omega x omega). Precisely: omega is seen unless it stays along y, as for omega = 0 or a rotation about y that is
     principal: then y stands still, and only the two components of omega across y are seen.
+
+    Args:
+        inertia: symmetric positive definite: a number, (3,) or (3, 3), exact. [kg m^2]
+        y: (3,) the direction that is measured, exact.
+        omega: (3,) body angular velocity, exact. [rad/s]
+        derivatives: k, from 0 to 12.
 
     Raises:
         ShapeError: y or omega has not three entries.

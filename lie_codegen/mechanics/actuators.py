@@ -18,6 +18,7 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.shapes import shaped
 from lie_codegen.values import settle
 
 
@@ -88,17 +89,35 @@ class MomentumWheels(Saved):
         return np.array(self.exact_C.tolist(), dtype=float)
 
     def body_rate(self, wheel_rates: ArrayLike) -> Array:
-        """Omega = C theta': (..., p) -> (..., 3). [rad/s]"""
-        return np.asarray(np.asarray(wheel_rates, dtype=float) @ self.C.T)
+        """Omega = C theta', TR 93-59, (69).
+
+        Args:
+            wheel_rates: (..., p) theta'. [rad/s]
+
+        Returns:
+            (..., 3). [rad/s]
+
+        Raises:
+            ShapeError: the last axis is not p.
+        """
+        rates = shaped(wheel_rates, (..., self.count), "MomentumWheels.body_rate: wheel_rates")
+        return np.asarray(rates @ self.C.T)
 
     def body_areas(self, wheel_areas: ArrayLike) -> Array:
-        """(p, p) antisymmetric areas of the wheel angles -> (3, 3) areas of the integrals of Omega: C area C^T.
+        """Areas of the integrals of Omega: C area C^T, TR 93-59, section 6.1.
 
-        For three wheels this is (Area_23, Area_31, Area_12) = cof(C) (area_23, area_31, area_12), section 6.1.
+        For three wheels this is (Area_23, Area_31, Area_12) = cof(C) (area_23, area_31, area_12).
+
+        Args:
+            wheel_areas: (p, p) antisymmetric areas of the wheel angles. [rad^2]
+
+        Returns:
+            (3, 3). [rad^2]
+
+        Raises:
+            ShapeError: the areas are not (p, p).
         """
-        areas = np.asarray(wheel_areas, dtype=float)
-        if areas.shape != (self.count, self.count):
-            raise ShapeError(f"body_areas: shape {areas.shape} for {self.count} wheels")
+        areas = shaped(wheel_areas, (self.count, self.count), "MomentumWheels.body_areas: wheel_areas")
         return np.asarray(self.C @ areas @ self.C.T)
 
     @property
@@ -144,15 +163,39 @@ class PointMassOscillator(Saved):
         return self.body_mass * self.point_mass / (self.body_mass + self.point_mass)
 
     def locked_inertia(self, y: ArrayLike) -> Array:
-        """I_lock(y) = I_0 + alpha_m (|y|^2 I - y y^T): (..., 3) -> (..., 3, 3)."""
-        position = np.asarray(y, dtype=float)
+        """I_lock(y) = I_0 + alpha_m (|y|^2 I - y y^T). [kg m^2]
+
+        Args:
+            y: (..., 3) position of the point mass in body axes. [m]
+
+        Returns:
+            (..., 3, 3).
+
+        Raises:
+            ShapeError: the last axis is not 3.
+        """
+        position = shaped(y, (..., 3), "PointMassOscillator.locked_inertia: y")
         square = np.sum(position**2, axis=-1)[..., None, None] * np.eye(3)
         outer = position[..., :, None] * position[..., None, :]
         return np.asarray(np.array(self.inertia.tolist(), dtype=float) + float(self.reduced_mass) * (square - outer))
 
     def body_rate(self, y: ArrayLike, y_dot: ArrayLike) -> Array:
-        """Omega = -alpha_m I_lock(y)^{-1} (y x y'), (70): (..., 3), (..., 3) -> (..., 3). [rad/s]"""
-        momentum = float(self.reduced_mass) * np.cross(np.asarray(y, dtype=float), np.asarray(y_dot, dtype=float))
+        """Omega = -alpha_m I_lock(y)^{-1} (y x y'), TR 93-59, (70).
+
+        Args:
+            y: (..., 3) position of the point mass in body axes. [m]
+            y_dot: (..., 3) its rate. [m/s]
+
+        Returns:
+            (..., 3). [rad/s]
+
+        Raises:
+            ShapeError: a last axis that is not 3.
+        """
+        momentum = float(self.reduced_mass) * np.cross(
+            shaped(y, (..., 3), "PointMassOscillator.body_rate: y"),
+            shaped(y_dot, (..., 3), "PointMassOscillator.body_rate: y_dot"),
+        )
         return -np.asarray(np.linalg.solve(self.locked_inertia(y), momentum[..., None])[..., 0])
 
 
@@ -162,6 +205,8 @@ def positive_inertia(value: Any, where: str) -> sp.ImmutableMatrix:
     Raises:
         ShapeError, InputError: naming `where`.
     """
+    if np.ndim(value) == 0 and not isinstance(value, sp.MatrixBase):
+        raise ShapeError(f"{where} is {value!r:.60}; give (3, 3), or three principal moments")
     rows = value.tolist() if isinstance(value, np.ndarray | sp.MatrixBase) else list(value)
     if len(rows) == 3 and not any(isinstance(row, Sequence) and not isinstance(row, str) for row in rows):
         matrix = sp.diag(*(_exact(entry) for entry in rows))
@@ -177,8 +222,14 @@ def positive_inertia(value: Any, where: str) -> sp.ImmutableMatrix:
 
 
 def _matrix(value: Any, where: str) -> sp.Matrix:
-    rows = value.tolist() if isinstance(value, np.ndarray | sp.MatrixBase) else [list(row) for row in value]
-    if not rows or len({len(row) for row in rows}) != 1:
+    rows = value.tolist() if isinstance(value, np.ndarray | sp.MatrixBase) else value
+    if (
+        not isinstance(rows, Sequence)
+        or not rows
+        or any(isinstance(row, str) or not isinstance(row, Sequence) for row in rows)
+    ):
+        raise ShapeError(f"{where} must be a list of rows, given {value!r:.60}")
+    if len({len(row) for row in rows}) != 1:
         raise ShapeError(f"{where} must be a list of rows of one length")
     return sp.Matrix([[_exact(entry) for entry in row] for row in rows])
 

@@ -22,6 +22,7 @@ from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.library import Library
+from lie_codegen.shapes import shaped
 
 if TYPE_CHECKING:
     from lie_codegen.kernel.kernel import Kernel
@@ -81,15 +82,16 @@ def simulate_driven(
         damping: (n, n) D; none if not given. With it an explicit method of order 8 runs in Python.
 
     Raises:
+        ShapeError: an argument of another shape, named.
         ComputationError: the tolerance is not met with two million steps, or the state is no longer finite.
     """
     group = as_group(group, "simulate_driven")
-    times = np.asarray(t, dtype=float)
+    times, n = shaped(t, ("k",), "simulate_driven: t"), group.dim
     signal = as_signal(group, force, times)
     start = initial_states(group, None, xi0)[0][0]
-    J = np.ascontiguousarray(inertia, dtype=float)
+    J = np.ascontiguousarray(shaped(inertia, (n, n), "simulate_driven: inertia"))
     if damping is not None and np.any(damping):
-        D = np.asarray(damping, dtype=float)
+        D = shaped(damping, (n, n), "simulate_driven: damping")
         return Driven(times, *damped_run(group, force, J, D, times, start[-group.dim :], tolerance))
     inverse = np.ascontiguousarray(np.linalg.inv(J))
     step = _library(group).driven_step

@@ -59,6 +59,10 @@ def driven_step(group: GroupLike, degree: int = TAYLOR_DEGREE, name: str = "driv
         group: any matrix group.
         degree: of the Taylor polynomial of the exponential.
         name: C identifier.
+
+    Raises:
+        UnknownGroupError: no such group.
+        IdentifierError: name is no C identifier.
     """
     group = as_group(group, "driven_step")
     n, size = group.dim, packed_size(group)

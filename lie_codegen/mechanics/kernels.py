@@ -37,7 +37,12 @@ def acceleration(
 
 @kernel_factory(group=as_group)
 def euler_poincare_kernel(group: GroupLike, inertia: Any, name: str = "acceleration") -> Kernel:
-    """(xi, force) -> (xi_dot, energy): I xi' = ad*_xi I xi + f and <I xi, xi>/2.
+    """(xi, force) -> (xi_dot, energy): I xi' = ad*_xi I xi + f and <I xi, xi>/2; Bullo and Murray, CIT-CDS 97-003, (10).
+
+    Args:
+        group: object, catalogue name or file.
+        inertia: symmetric positive definite: a number, (n,) or (n, n).
+        name: C identifier.
 
     Raises:
         InputError: the inertia is not symmetric positive definite.
@@ -66,6 +71,11 @@ def euler_poincare_kernel(group: GroupLike, inertia: Any, name: str = "accelerat
 @kernel_factory(group=as_group)
 def spatial_momentum_kernel(group: GroupLike, inertia: Any, name: str = "spatial_momentum") -> Kernel:
     """(X, xi) -> Ad*_{X^-1} I xi, which a free body keeps.
+
+    Args:
+        group: object, catalogue name or file.
+        inertia: symmetric positive definite: a number, (n,) or (n, n).
+        name: C identifier.
 
     Raises:
         InputError: the inertia is not symmetric positive definite.

@@ -94,6 +94,9 @@ def relative_equilibrium(
 ) -> RelativeEquilibrium:
     """The equilibrium nearest to a guess (n,), of all that `relative_equilibria` finds around it.
 
+    Args:
+        system, guess, parameters: as there.
+
     Raises:
         InputError: a parameter without a value.
         ComputationError: no equilibrium is found.
@@ -113,6 +116,13 @@ def relative_equilibria(
 
     Newton's method on the generalized force at rest, from the guess and from `starts` random points (seeded) of the box guess +-
     `reach`. Newton's method alone may run past the nearest root to another; that none is missed is likely, not proved.
+
+    Args:
+        system: of `lagrangian_system`, or its `routh_reduction`.
+        guess: (n,) coordinates.
+        parameters: name -> number, of every parameter.
+        reach: half a side of the box, in the unit of the coordinates.
+        starts: how many points of it.
 
     Raises:
         InputError: a parameter without a value, a guess of the wrong length, starts below 0.
@@ -169,6 +179,9 @@ def linear_controllability(equilibrium: RelativeEquilibrium) -> LinearControllab
 
     Returns:
         The verdict, the roots, and at each the n-th singular value relative to the first; where it is lost, the direction that no input moves.
+
+    Raises:
+        ArgumentError: equilibrium is no `RelativeEquilibrium`.
     """
     e, n = equilibrium, len(equilibrium.q)
     smallest, reason = [], "rank [s^2 M + s C + K, B] is full at every root"

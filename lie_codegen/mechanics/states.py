@@ -24,9 +24,14 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
     X = np.eye(d, dtype=kind) if X0 is None else np.asarray(X0, dtype=kind)
     xi = np.zeros(n) if xi0 is None else np.asarray(xi0, dtype=float)
     if X.shape[-2:] != (d, d) or X.ndim not in (2, 3) or xi.shape[-1:] != (n,) or xi.ndim not in (1, 2):
-        raise ShapeError(f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},)")
+        raise ShapeError(
+            f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},), or N of either: (N, {d}, {d}), (N, {n})"
+        )
     many = X.ndim == 3 or xi.ndim == 2
-    count = max(X.shape[0] if X.ndim == 3 else 1, xi.shape[0] if xi.ndim == 2 else 1)
+    counts = {*X.shape[:-2], *xi.shape[:-1]} - {1}
+    if len(counts) > 1:
+        raise ShapeError(f"initial states on {group.name}: {len(X)} X0 and {len(xi)} xi0; give one of each, or as many")
+    count = max(counts, default=1)
     X = admitted(group, X, "X0").X if X.ndim == 2 else admitted_all(group, X, "X0")[0]
     X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
     rows, columns = np.array(varying_entries(group)).T

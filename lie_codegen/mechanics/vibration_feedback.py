@@ -55,6 +55,7 @@ def vibration_feedback(
         forces: (m, n) covectors.
         k_p, k_d: of eta = -k_p log(X) - k_d xi, in 1/s^2 and 1/s.
         frequency: w of the slowest oscillation [rad/s]. None of these numbers can be "input": the loop must be slow beside the oscillation.
+        name: C identifier.
 
     Raises:
         InputError: the loop's rate, max |s| of s^2 + k_d s + k_p = 0, times the period 2 pi / w exceeds .7.

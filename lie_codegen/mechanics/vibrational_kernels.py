@@ -25,6 +25,14 @@ def vibrational_kernels(fields: VibrationalFields, namespace: str) -> tuple[Kern
     rate(z, eps) = Z_1 + eps Z_2; actual(y, tau, eps) = X + (1/eps) Y_a u^a(tau);
     estimate(y, tau, eps) = P^{-1}(Phi^{-1}(y)), (24), `estimate_first` without P;
     reconstruct(z, tau, eps) = Phi(P(z)). Parameters that stayed symbols are further scalar inputs, in order.
+
+    Args:
+        fields: of `vibrational_fields`.
+        namespace: C identifier that begins the symbols.
+
+    Raises:
+        IdentifierError: namespace is no C identifier.
+        ArgumentError: fields are no such fields.
     """
     n = len(fields.state)
     z, y = Port("z", (n,), description="averaged state (q, v)"), Port("y", (n,), description="actual state (q, v)")
@@ -104,6 +112,10 @@ def lagrangian_kernels(system: LagrangianSystem, namespace: str = "lagrangian") 
         system: n coordinates and m inputs: y is (2 n,), the coordinates before their rates; u is (m,) and left out where m = 0.
             The parameters are scalar inputs in the system's order.
         namespace: C identifier that begins the symbols.
+
+    Raises:
+        IdentifierError: namespace is no C identifier.
+        ArgumentError: system is no `LagrangianSystem`.
     """
     n, m = len(system.state), len(system.inputs)
     ports = [Port("y", (n,), description=", ".join(map(str, system.state)))]

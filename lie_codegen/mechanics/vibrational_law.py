@@ -34,6 +34,10 @@ def feedback_kernels(design: VibrationalFeedback, namespace: str, *, steps: int 
         design: of `design_feedback`.
         namespace: prefix of the C symbols.
         steps: Runge-Kutta steps a period of the closed loop.
+
+    Raises:
+        IdentifierError: namespace is no C identifier.
+        ArgumentError: design is no such feedback.
     """
     fields, n, na = design.fields, len(design.fields.state), len(design.amplitudes)
     named = {kernel.name: kernel for kernel in vibrational_kernels(fields, namespace)}

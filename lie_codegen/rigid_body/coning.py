@@ -11,6 +11,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.rigid_body.free_rigid_body import FreeRigidBody, check_slow
 from lie_codegen.rigid_body.principal_body import TAU
+from lie_codegen.shapes import shaped
 
 
 class ConingAngles(NamedTuple):
@@ -36,10 +37,11 @@ def coning_angles(body: FreeRigidBody, omega: ArrayLike) -> ConingAngles:
 
     Raises:
         InputError: omega = 0.
+        ShapeError: the last axis of omega is not 3.
 
     Source: Coppola, The method of averaging for Euler's equations of rigid body motion, (6), (7).
     """
-    w = np.asarray(omega, dtype=float)
+    w = shaped(omega, (..., 3), "coning_angles: omega")
     momentum = np.stack([sign * w[..., i] for i, sign in body.model.axes], axis=-1) * _moments(body)
     if np.any(np.linalg.norm(momentum, axis=-1) == 0):
         raise InputError("coning_angles: a body at rest has no angular momentum")
@@ -51,6 +53,13 @@ def coning_bounds(body: FreeRigidBody, k: ArrayLike) -> ConingBounds:
     """(theta_min, theta_max) of the torque-free motion of modulus k; of a spin of sign s3 = -1 they are measured from -x3.
 
     cos theta_min = 1 / sqrt(1 + gamma_13^2 k^2), cos theta_max = sqrt((1 - k^2) / (1 + gamma_13^2 k^2)), (16).
+
+    Args:
+        body: of `free_rigid_body`.
+        k: (...) moduli.
+
+    Returns:
+        Two arrays (...). [rad]
 
     Raises:
         InputError: k outside [0, 0.999999].
@@ -65,7 +74,11 @@ def coning_bounds(body: FreeRigidBody, k: ArrayLike) -> ConingBounds:
 
 
 def modulus_squared(body: FreeRigidBody, inertia: ArrayLike) -> Array:
-    """k^2 = (I1 - I2)(I - I3) / ((I2 - I3)(I1 - I)) of the momentum parameter I = L^2 / 2T [kg m^2], (18).
+    """k^2 = (I1 - I2)(I - I3) / ((I2 - I3)(I1 - I)) of the momentum parameter I = L^2 / 2T, (18).
+
+    Args:
+        body: of `free_rigid_body`.
+        inertia: (...) values of I. [kg m^2]
 
     Raises:
         InputError: I on the other side of the middle moment, or outside the moments, where no motion circles this axis.

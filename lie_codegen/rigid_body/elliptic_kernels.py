@@ -30,6 +30,9 @@ def elliptic_kernels(namespace: str = NAMESPACE) -> tuple[Kernel, ...]:
 
     Args:
         namespace: prefix of the C symbols.
+
+    Raises:
+        IdentifierError: namespace is no C identifier.
     """
     return (
         Kernel(

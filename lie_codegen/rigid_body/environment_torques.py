@@ -27,14 +27,35 @@ class torque:  # noqa: N801
 
     @staticmethod
     def gravity_gradient(position: Any, mu: float, *, parameters: Mapping[str, Any] | None = None) -> Torque:
-        """3 mu / r^3 b x J b: `position` of the body from the centre of attraction [m], mu [m^3/s^2]."""
+        """3 mu / r^3 b x J b, b the direction of the position in body axes.
+
+        Args:
+            position: of the body from the centre of attraction; as the class says. [m]
+            mu: of that centre. [m^3/s^2]
+            parameters: name -> number, of formulas.
+
+        Raises:
+            InputError: a position that is none, a parameter without a value.
+            NotFiniteError: a mu that is NaN or infinite.
+        """
         return Torque("gravity_gradient", _direction(position, parameters, "position"), {"mu": _number(mu, "mu")})
 
     @staticmethod
     def solar_pressure(
         body: Plates, sun: Any, pressure: float = 4.56e-6, *, parameters: Mapping[str, Any] | None = None
     ) -> Torque:
-        """-P A max(0, n.b) r x [(1 - rho_s) b + (2 rho_s n.b + 2/3 rho_d) n] a plate; `sun` towards it, pressure P [Pa]."""
+        """-P A max(0, n.b) r x [(1 - rho_s) b + (2 rho_s n.b + 2/3 rho_d) n] a plate, b the direction towards the sun in body axes.
+
+        Args:
+            body: of `plates`.
+            sun: towards it; as the class says.
+            pressure: P. [Pa]
+            parameters: name -> number, of formulas.
+
+        Raises:
+            InputError: a direction that is none, a parameter without a value.
+            NotFiniteError: a pressure that is NaN or infinite.
+        """
         return Torque(
             "solar_pressure",
             _direction(sun, parameters, "sun"),
@@ -44,7 +65,18 @@ class torque:  # noqa: N801
 
     @staticmethod
     def drag(body: Plates, velocity: Any, pressure: float, *, parameters: Mapping[str, Any] | None = None) -> Torque:
-        """-P A max(0, n.b) r x b a plate: `velocity` of the body against the gas, P = rho C_D v^2 / 2 [Pa]."""
+        """-P A max(0, n.b) r x b a plate, b the direction of the velocity in body axes, n its normal, r its centre.
+
+        Args:
+            body: of `plates`.
+            velocity: of the body against the gas; as the class says.
+            pressure: P = rho C_D v^2 / 2. [Pa]
+            parameters: name -> number, of formulas.
+
+        Raises:
+            InputError: a direction that is none, a parameter without a value.
+            NotFiniteError: a pressure that is NaN or infinite.
+        """
         bare = checked_plates(body)
         dull = Plates(bare.normals, bare.centres, bare.areas, np.zeros_like(bare.areas), np.zeros_like(bare.areas))
         return Torque(
@@ -53,7 +85,17 @@ class torque:  # noqa: N801
 
     @staticmethod
     def eddy_current(M: ArrayLike, field: Any, *, parameters: Mapping[str, Any] | None = None) -> Torque:
-        """(M (omega x b)) x b: M (3, 3) or a number [S m^4], b the magnetic `field` [T] in body axes."""
+        """(M (omega x b)) x b, b the magnetic field in body axes.
+
+        Args:
+            M: (3, 3) or a number. [S m^4]
+            field: as the class says. [T]
+            parameters: name -> number, of formulas.
+
+        Raises:
+            InputError: a field that is none, a parameter without a value.
+            ShapeError: an M of another shape, or not finite.
+        """
         tensor = np.array(M, dtype=float)
         tensor = tensor * np.eye(3) if tensor.ndim == 0 else tensor
         if tensor.shape != (3, 3) or not np.all(np.isfinite(tensor)):
@@ -62,7 +104,17 @@ class torque:  # noqa: N801
 
     @staticmethod
     def residual_dipole(m: ArrayLike, field: Any, *, parameters: Mapping[str, Any] | None = None) -> Torque:
-        """m x b: dipole m (3,) [A m^2] in body axes, b the magnetic `field` [T] in body axes."""
+        """m x b, b the magnetic field in body axes.
+
+        Args:
+            m: (3,) dipole in body axes. [A m^2]
+            field: as the class says. [T]
+            parameters: name -> number, of formulas.
+
+        Raises:
+            InputError: a field that is none, a parameter without a value.
+            ShapeError: an m that is not three finite numbers.
+        """
         dipole = np.array(m, dtype=float)
         if dipole.shape != (3,) or not np.all(np.isfinite(dipole)):
             raise ShapeError(f"residual_dipole: m has shape {dipole.shape}; three finite numbers")

@@ -16,6 +16,7 @@ from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.relative_equilibria import NewtonMethod
 from lie_codegen.rigid_body.euler_average import EulerAverage
+from lie_codegen.rigid_body.free_rigid_body import check_slow
 from lie_codegen.rigid_body.principal_body import TAU
 
 
@@ -49,6 +50,15 @@ def limit_cycles(
 
     For g homogeneous in omega (linear feedback, drag) the roots do not depend on Omega: the cycle exists on the momentum
     sphere whether or not the spin grows, (35). It is an equilibrium of the averaged flow when `growth` is 0, (36).
+
+    Args:
+        flow: of `euler_average`.
+        Omega: the spin. [rad/s]
+        largest_k: of the search; at most 0.999999.
+        tau: the slow time at which. [s]
+
+    Raises:
+        InputError: largest_k or Omega where the average is not known.
     """
     from scipy.optimize import brentq
 
@@ -174,7 +184,12 @@ def momentum_directions(flow: EulerAverage, k: float, count: int = 200) -> Array
         flow: of which body.
         k: the modulus, from 0 up to but not 1.
         count: points, at equal phases, the first and the last the same.
+
+    Raises:
+        InputError: k outside [0, 0.999999].
+        ArgumentError: a count that is no whole number.
     """
+    check_slow(1.0, float(k))
     body = flow.body.model
     ops = NumpyArithmetic()
     at = jacobi(ops, np.linspace(0, 1, count), ladder(ops, np.float64(k)))

@@ -19,6 +19,7 @@ from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
 from lie_codegen.runtime.ode import REACHED, integrate
 from lie_codegen.runtime.ode_field import Field
+from lie_codegen.shapes import shaped
 
 #: k of a start in the polar coordinates (k, phi).
 _LEAST = 1e-12
@@ -53,8 +54,15 @@ def solve_averaged(
     of the way to the separatrix) or the spin dies out, what was computed before is returned, and the status says so. This
     is the paper's way to start, at the osculating point; `EulerAverage.solve` starts at the mean point.
 
+    Args:
+        flow: of `euler_average`.
+        Omega0, k0, phi0: spin [rad/s], modulus and phase at t[0].
+        t: (N,) increasing times. [s]
+        eps: the small parameter.
+        rtol: local relative error.
+
     Raises:
-        InputError: as `EulerAverage.averaged`, for the start.
+        InputError: as `EulerAverage.averaged`, for the start; times that do not increase.
         ComputationError: averaging is not valid at the start.
     """
     times = _times(t)
@@ -97,11 +105,20 @@ def _leaves(t: float, spin: float, k: float) -> str:
 def solve_actual(flow: EulerAverage, omega0: ArrayLike, t: ArrayLike, eps: float, *, rtol: float = 1e-11) -> Array:
     """omega (N, 3) [rad/s] of the full equations (3) at times t, by compiled steps of order 8.
 
+    Args:
+        flow: of `euler_average`: its body and its perturbation.
+        omega0: (3,) at t[0]. [rad/s]
+        t: (N,) increasing times. [s]
+        eps: the small parameter.
+        rtol: local relative error.
+
     Raises:
+        InputError: times that do not increase.
+        ShapeError: omega0 is not (3,).
         ComputationError: the integration fails.
     """
     times, function = _times(t), flow.library["rate"]
-    start = np.asarray(omega0, dtype=np.float64)
+    start = shaped(omega0, (3,), "solve_actual: omega0")
     if flow.perturbation.is_autonomous:
         rate = Field(function, 3, state="omega", time=None, constants={"eps": eps})
     else:
@@ -132,6 +149,12 @@ def explicit_inertia_change(body: PrincipalBody, L: float, k0: float, tau: Array
 
     It replaces 1 - E/K by k^2 / 2: a small-k model whose error does not vanish with eps. Use `solve_averaged` where k is
     not small.
+
+    Args:
+        body: with moments that are formulas in tau.
+        L: the angular momentum, which stays. [kg m^2/s]
+        k0: the modulus at tau = 0.
+        tau: (...) slow times eps t. [s]
 
     Raises:
         InputError: r0^2 gamma_12 reaches 1, where the model has no motion.

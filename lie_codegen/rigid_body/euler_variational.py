@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from lie_codegen.errors import InputError
+from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.on_demand import sympy as sp
@@ -128,6 +128,11 @@ def euler_perturbation(
 
     dw1 dw2 dw3 stand for the unperturbed accelerations, which is enough to first order in eps.
 
+    Args:
+        body: of `free_rigid_body`, or its `.model`.
+        terms: g_1, g_2, g_3: texts or SymPy expressions. [rad/s^2 per unit eps]
+        parameters: name -> number, of every name that is no variable.
+
     Raises:
         InputError: not three terms, a parameter that hides a variable, or one without a value.
         ExpressionError: a text outside the grammar.
@@ -166,13 +171,17 @@ def moving_parts(
         torques: (3,) G_n0.
         gains: (3, 3) G_nm beyond that term: linear feedback, mass flow with a signed rate (negative when ejecting).
         products: (I_12, I_13, I_23), the products of inertia divided by eps.
+
+    Raises:
+        ExpressionError: a text that is no formula in tau.
+        ShapeError: torques, gains or products of other shapes.
     """
     names = {"tau": TAU}
-    torque = [formula(value, names, "torque") for value in (torques if torques is not None else (0, 0, 0))]
-    gain = sp.Matrix(
-        3, 3, [formula(v, names, "gain") for row in (gains if gains is not None else [[0] * 3] * 3) for v in row]
-    )
-    p12, p13, p23 = (formula(v, names, "product of inertia") for v in (products if products is not None else (0, 0, 0)))
+    none = [0, 0, 0]
+    torque = [formula(v, names, "torque") for v in _three(torques, none, "torques")]
+    rows = [_three(row, none, "a row of gains") for row in _three(gains, [none] * 3, "gains")]
+    gain = sp.Matrix(3, 3, [formula(v, names, "gain") for row in rows for v in row])
+    p12, p13, p23 = (formula(v, names, "product of inertia") for v in _three(products, none, "products"))
     product = {frozenset((0, 1)): p12, frozenset((0, 2)): p13, frozenset((1, 2)): p23}
     w, a, inertia = _RATES, _ACCELERATIONS, body.inertia
     terms = []
@@ -186,3 +195,11 @@ def moving_parts(
         linear = sum(gain[n, j] * w[j] for j in range(3)) - sp.diff(inertia[n], TAU) / inertia[n] * w[n]
         terms.append(torque[n] + linear + internal / inertia[n])
     return terms[0], terms[1], terms[2]
+
+
+def _three(value: Any, default: list[Any], what: str) -> list[Any]:
+    if value is None:
+        return default
+    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 3:
+        raise ShapeError(f"moving_parts: {what} must hold three entries, given {value!r:.60}")
+    return list(value)

@@ -97,7 +97,7 @@ class Library:
 
         Raises:
             InputError: it has no definition.
-            OSError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written.
         """
         from lie_codegen.kernel.saved import save_definition
 

@@ -82,7 +82,11 @@ class ParametricInput(Saved):
         return len(self.components)
 
     def values(self, given: Mapping[str, Any], *, many: bool = False) -> tuple[Any, ...]:
-        """The parameters in their order, as floats; with `many` also (N,) arrays of them.
+        """The parameters in their order, as floats.
+
+        Args:
+            given: name -> number.
+            many: (N,) arrays are taken, too.
 
         Raises:
             InputError: a parameter that is missing or unknown.
@@ -106,7 +110,11 @@ class ParametricInput(Saved):
         return found if times.ndim else found[0]
 
     def as_formula(self, start: float, end: float) -> FormulaInput | None:
-        """Without parameters, a sum of sines and cosines as compiled loops evaluate it; None otherwise."""
+        """Without parameters, a sum of sines and cosines as compiled loops evaluate it; None otherwise.
+
+        Args:
+            start, end: the interval of time; the sum serves any.
+        """
         if self.parameters or self.waves is None or self.breakpoints:
             return None
         numbers, F, n = np.array(self.waves.evaluate(), dtype=float), self.waves.count, self.dim
@@ -114,7 +122,16 @@ class ParametricInput(Saved):
         return fourier_input(numbers[:F], cosines, sines)
 
     def derivatives(self, t: ArrayLike, **given: Any) -> Array:
-        """du/dp: (k, m, n) at (k,) times, m parameters in their order."""
+        """du/dp: (k, m, n) at (k,) times, m parameters in their order.
+
+        Args:
+            t: a time or (k,) times.
+            given: each parameter by its name, a number.
+
+        Raises:
+            InputError: a parameter that is missing or unknown.
+            ShapeError, NotFiniteError: one that is no number.
+        """
         times = np.atleast_1d(np.asarray(t, dtype=float))
         m = len(self.parameters)
         if not m:
@@ -123,6 +140,9 @@ class ParametricInput(Saved):
 
     def period_of(self, values: Sequence[float]) -> tuple[float, Array]:
         """The period and its derivatives (m,).
+
+        Args:
+            values: (m,) numbers, of the parameters in their order.
 
         Raises:
             InputError: there is none, or it is not positive.

@@ -139,7 +139,11 @@ class PeriodicInput(Saved):
         return PeriodicInput, (*given, None, self.pieces, self.table)
 
     def as_formula(self, start: float, end: float) -> FormulaInput | None:
-        """u on [start, end] as a compiled loop evaluates it; None where it is neither a Fourier series nor straight pieces."""
+        """u as a compiled loop evaluates it; None where it is neither a Fourier series nor straight pieces.
+
+        Args:
+            start, end: the interval of time on which it has to serve.
+        """
         if self._numbers.series is not None:
             return self._numbers.series
         return None if self._numbers.lines is None else lines_between(self._numbers.lines, self.T, start, end)
@@ -170,7 +174,12 @@ class PeriodicInput(Saved):
     def from_callable(
         function: Callable[[Array], ArrayLike], period: Any, *, breakpoints: Sequence[float] = ()
     ) -> PeriodicInput:
-        """A vectorised function on [0, T): (k,) -> (k, n), continued periodically; moments by quadrature.
+        """A vectorised function on [0, T), continued periodically; moments by quadrature.
+
+        Args:
+            function: (k,) times -> (k, n).
+            period: T, a number or a text such as "2*pi".
+            breakpoints: times in [0, T) at which it is not smooth.
 
         Raises:
             ShapeError: if the function does not return (k, n).
@@ -191,7 +200,11 @@ class PeriodicInput(Saved):
 
     @staticmethod
     def from_samples(values: ArrayLike, period: Any) -> PeriodicInput:
-        """The trigonometric polynomial through (N, n) samples at t = 0, T/N, .., (N-1) T/N (N odd or even).
+        """The trigonometric polynomial through samples at t = 0, T/N, .., (N-1) T/N (N odd or even).
+
+        Args:
+            values: (N, n).
+            period: T, a number or a text such as "2*pi".
 
         Raises:
             ShapeError, NotFiniteError: naming `values`.
@@ -205,6 +218,10 @@ class PeriodicInput(Saved):
 
         Each formula is in the time t of the whole period. Polynomials in t with sines and cosines of commensurate rates
         stay exact, such as (62)-(63) of TR 93-59; others are taken by their values.
+
+        Args:
+            pieces: (end of the interval, n formulas) in the order of time.
+            parameters: names that stay symbols.
 
         Raises:
             InputError: if the ends do not increase from 0, or a formula is not understood.
@@ -282,11 +299,22 @@ class PeriodicInput(Saved):
         return self._evaluate(np.asarray(t, dtype=float))
 
     def integral(self, t: ArrayLike) -> Array:
-        """ut(t) = int_0^t u, any t: (...,) -> (..., n)."""
+        """ut(t) = int_0^t u: (..., n), any t.
+
+        Args:
+            t: (...) times.
+
+        Raises:
+            ArgumentError: t is no number.
+        """
         return self._integrate(np.asarray(t, dtype=float))
 
     def breakpoints_between(self, start: float, end: float) -> Array:
-        """The times in [start, end] at which the input may jump: its breakpoints and whole periods, repeated."""
+        """The times at which the input may jump: its breakpoints and whole periods, repeated.
+
+        Args:
+            start, end: the interval, its ends included.
+        """
         if not self.breakpoints:
             return np.empty(0)
         periods = np.arange(np.floor(start / self.T), np.ceil(end / self.T) + 1)
@@ -295,6 +323,9 @@ class PeriodicInput(Saved):
 
     def at(self, **values: Any) -> PeriodicInput:
         """The input with numbers (floats at their exact binary value) in place of parameters.
+
+        Args:
+            values: name -> number, as keywords; the others stay parameters.
 
         Raises:
             InputError: for a name that is not a parameter.

@@ -59,7 +59,11 @@ class SampledInput(Saved):
         settle(self, times=t, values=v, formula=lines_input(times, left, right))
 
     def as_formula(self, start: float, end: float) -> FormulaInput:
-        """Itself: straight pieces at all times."""
+        """Itself: straight pieces at all times.
+
+        Args:
+            start, end: the interval of time; the pieces serve any.
+        """
         return self.formula
 
     @property

@@ -22,6 +22,9 @@ class Cone(Saved):
         axis: (3,) in the body, a star tracker's line of sight.
         direction: (3,) in space, towards the sun.
         half_angle: rad.
+
+    Raises:
+        SteeringInputError: when a task reads it: a vector that is zero or not three numbers, an angle that is not between 0 and pi.
     """
 
     axis: tuple[float, float, float]
@@ -29,7 +32,11 @@ class Cone(Saved):
     half_angle: float
 
     def parameters(self) -> tuple[float, ...]:
-        """axis, direction (unit vectors), cos(half_angle)."""
+        """axis, direction (unit vectors), cos(half_angle).
+
+        Raises:
+            SteeringInputError: a vector that is zero or not three numbers, an angle that is not between 0 and pi.
+        """
         axis, direction = np.asarray(self.axis, dtype=float), np.asarray(self.direction, dtype=float)
         for name, vector in (("axis", axis), ("direction", direction)):
             if vector.shape != (3,) or not np.all(np.isfinite(vector)) or not np.linalg.norm(vector) > 0:
@@ -40,7 +47,14 @@ class Cone(Saved):
         return (*map(float, unit), float(np.cos(self.half_angle)))
 
     def clearance(self, X: Array) -> Array:
-        """cos(half_angle) - cos(angle), (k,): negative inside the cone."""
+        """cos(half_angle) - cos(angle), (k,): negative inside the cone.
+
+        Args:
+            X: (k, d, d) elements, the rotation in the upper left corner.
+
+        Raises:
+            SteeringInputError: as the class.
+        """
         p = np.array(self.parameters())
         return np.asarray(p[6] - (X[:, :3, :3] @ p[:3]) @ p[3:6])
 
@@ -52,19 +66,33 @@ class Ball(Saved):
     Attributes:
         center: (2,) or (3,).
         radius: in the unit of the positions.
+
+    Raises:
+        SteeringInputError: when a task reads it: a center that is not finite, a radius that is not positive.
     """
 
     center: tuple[float, ...]
     radius: float
 
     def parameters(self) -> tuple[float, ...]:
-        """center, radius."""
+        """center, radius.
+
+        Raises:
+            SteeringInputError: a center that is not finite, a radius that is not positive.
+        """
         if not np.all(np.isfinite(self.center)) or not self.radius > 0 or not np.isfinite(self.radius):
             raise SteeringInputError(f"Ball: a finite center and a positive radius, got {self.center}, {self.radius!r}")
         return (*map(float, self.center), float(self.radius))
 
     def clearance(self, X: Array) -> Array:
-        """|p - center|^2 - radius^2, (k,): negative inside."""
+        """|p - center|^2 - radius^2, (k,): negative inside.
+
+        Args:
+            X: (k, d, d) elements with positions.
+
+        Raises:
+            ArgumentError: positions of another dimension.
+        """
         p = X[:, :-1, -1] - np.asarray(self.center)
         return np.asarray(np.sum(p * p, axis=1) - self.radius**2)
 

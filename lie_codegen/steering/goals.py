@@ -34,6 +34,10 @@ class Pointing(Saved):
     Attributes:
         axis: in the body.
         direction: in space; only its direction counts.
+
+    Raises:
+        ShapeError: a vector that is no numbers.
+        NotFiniteError: one that holds NaN or infinity.
     """
 
     axis: ArrayLike
@@ -53,6 +57,10 @@ class Position(Saved):
 
     Attributes:
         point: one coordinate for each dimension, m.
+
+    Raises:
+        ShapeError: a point that is no numbers.
+        NotFiniteError: one that holds NaN or infinity.
     """
 
     point: ArrayLike
@@ -69,6 +77,10 @@ class Coset(Saved):
         element: (d, d) T.
         free: labels, positions, or (n,) vectors of the algebra that span that of H.
         side: "right": turns about the body's own axes are free; "left": about those of space.
+
+    Raises:
+        SteeringInputError: another side.
+        ShapeError, NotFiniteError: an element or a direction that is no numbers, or not finite ones.
     """
 
     element: ArrayLike
@@ -94,6 +106,9 @@ class UpToPhase(Saved):
     Attributes:
         gate: (d, d) unitary U, or (s, s) on s levels; its determinant need not be one.
         levels: s different positions from 0 to d - 1; all if not given.
+
+    Raises:
+        ShapeError, NotFiniteError: a gate or levels that are no numbers, or not finite ones.
     """
 
     gate: ArrayLike

@@ -18,7 +18,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.saved import Saved, json_value, table_text
+from lie_codegen.kernel.saved import Saved, json_value, table_text, write_file
 from lie_codegen.values import Value, settle
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
@@ -196,6 +196,7 @@ class Plan(Saved):
         method: the method that made it.
         u: u(t) -> (n,), vectorised, on [0, duration].
         cost: int_0^duration |u|^2 dt; of objective="fuel" int sum_i w_i |u_i| dt.
+        outcome: status, seconds and details, or what they follow from when they are first read.
         projected: Frobenius distance from the target that was given to `target`, its projection onto the group; 0.0 where
             it was on the group.
         X_final: where the true system ends.
@@ -256,7 +257,13 @@ class Plan(Saved):
         return known
 
     def X(self, t: ArrayLike) -> Array:
-        """(d, d) at a time, (k, d, d) at (k,) times: the true system under u, from where the plan starts.
+        """The true system under u, from where the plan starts.
+
+        Args:
+            t: a time or (k,) times in [0, duration].
+
+        Returns:
+            (d, d) at a time, (k, d, d) at (k,) times.
 
         Raises:
             InputError: a time is outside [0, duration].
@@ -286,17 +293,38 @@ class Plan(Saved):
         return import_module(PATH).simulated(self, group, **options)
 
     def to_csv(self, path: str | Path | None = None, *, t: ArrayLike | None = None) -> str:
-        """The controls as a table: t and one column a component; at 101 equal times if `t` is not given. Written where a path is
-        given; returned as a text in any case."""
+        """The controls as a table: t and one column a component.
+
+        Args:
+            path: written there, if given.
+            t: (k,) times; 101 equal ones if not given.
+
+        Returns:
+            The text.
+
+        Raises:
+            InputError: a time is outside [0, duration].
+            OutputFolderError, SystemRefusalError: the file cannot be written.
+        """
         times = np.linspace(0.0, self.duration, 101) if t is None else np.atleast_1d(np.asarray(t, dtype=float))
         values = self.u(times)
         text = table_text({"t": times, **{f"u_{label}": values[:, i] for i, label in enumerate(self.group.labels)}})
         if path is not None:
-            Path(path).write_text(text, encoding="utf-8")
+            write_file(path, text)
         return text
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """All facts of the plan and its controls at 101 times as JSON, for other programs (`save` and `lc.load` keep the plan)."""
+        """All facts of the plan and its controls at 101 times as JSON, for other programs (`save` and `lc.load` keep the plan).
+
+        Args:
+            path: written there, if given.
+
+        Returns:
+            The text.
+
+        Raises:
+            OutputFolderError, SystemRefusalError: the file cannot be written.
+        """
         times = np.linspace(0.0, self.duration, 101)
         record = {
             "group": self.group.name,
@@ -316,11 +344,16 @@ class Plan(Saved):
         }
         text = json.dumps(json_value(record), indent=1)
         if path is not None:
-            Path(path).write_text(text, encoding="utf-8")
+            write_file(path, text)
         return text
 
     def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:
         """The controls as C with a program that runs them, as `lc.generate(plan, folder)` writes them.
+
+        Args:
+            name: of the package, by the group and the method if None.
+            real: "double" or "float".
+            form: "auto", "table" or "fourier"; None is "auto".
 
         Raises:
             InputError: no such form, or "fourier" of controls that are no Fourier series over the duration.
@@ -342,7 +375,17 @@ class Plan(Saved):
         return f"<pre>{escape(repr(self))}</pre>{sketch(t, curves, names)}"
 
     def inputs(self, t: ArrayLike) -> Array:
-        """What each control does: (m,) at a time, (k, m) at (k,) times; u(t) = sum_i inputs_i b_i(t), without the drift."""
+        """What each control does: u(t) = sum_i inputs_i b_i(t), without the drift.
+
+        Args:
+            t: a time or (k,) times in [0, duration].
+
+        Returns:
+            (m,) at a time, (k, m) at (k,) times.
+
+        Raises:
+            InputError: a time is outside [0, duration].
+        """
         made = self.details.get("inputs")
         if made is not None:
             return np.asarray(made(t))

@@ -39,7 +39,7 @@ class Designed(Distribution):
         return int(self.of.slots)
 
     def draw(self, uniform: Array) -> Array:
-        """As the distribution."""
+        """As the distribution, of `uniform` numbers (N, slots) in (0, 1)."""
         return np.asarray(self.of.draw(uniform))
 
 
@@ -47,6 +47,14 @@ class Sobol(Designed):
     """Scrambled Sobol points (scipy.stats.qmc) for a distribution: Sobol(low, high), Sobol(Normal(0, 1)).
 
     All Sobol inputs of a space are the coordinates of one sequence. A power of two samples fills evenly.
+
+    Attributes:
+        of: a distribution, or the lower end; with
+        high: the upper end, 1 if not given.
+
+    Raises:
+        InputError: a distribution beside `high`, or one that is not random; ends as `Uniform`.
+        ShapeError: ends that do not broadcast.
     """
 
 
@@ -55,4 +63,12 @@ class LatinHypercube(Designed):
 
     All such inputs of a space are the coordinates of one design, which is laid out for all n samples at once: at most
     2 10^7 numbers, and n cannot grow later. Sobol has neither limit.
+
+    Attributes:
+        of: a distribution, or the lower end; with
+        high: the upper end, 1 if not given.
+
+    Raises:
+        InputError: a distribution beside `high`, or one that is not random; ends as `Uniform`.
+        ShapeError: ends that do not broadcast.
     """

@@ -66,6 +66,10 @@ class Normal(Distribution):
         mean: a number or an array, which gives the shape of a value.
         std: standard deviation, of the same shape or one for all entries; or
         cov: (n, n) covariance of an (n,) vector, symmetric, no negative eigenvalue.
+
+    Raises:
+        InputError: a negative std, a covariance that is not one, numbers that are not finite.
+        ShapeError: shapes that do not go together.
     """
 
     mean: Any = 0.0
@@ -96,7 +100,7 @@ class Normal(Distribution):
         return int(self.mean.size)
 
     def draw(self, uniform: Array) -> Array:
-        """(N, slots) -> (N, *mean.shape)."""
+        """Values (N, *mean.shape) of `uniform` numbers (N, slots) in (0, 1)."""
         z = normal_quantile(uniform)
         if self.cov is not None:
             return np.asarray(self.mean + z @ covariance_factor("Normal: cov", self.cov).T)
@@ -118,7 +122,15 @@ def covariance_factor(where: str, cov: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uniform(Distribution):
-    """Numbers, or arrays of them, between low and high, which have one shape or broadcast."""
+    """Numbers, or arrays of them, between low and high.
+
+    Attributes:
+        low, high: of one shape, or they broadcast.
+
+    Raises:
+        InputError: a low above its high, or numbers that are not finite.
+        ShapeError: shapes that do not broadcast.
+    """
 
     low: Any = 0.0
     high: Any = 1.0
@@ -133,13 +145,21 @@ class Uniform(Distribution):
         return int(self.low.size)
 
     def draw(self, uniform: Array) -> Array:
-        """(N, slots) -> (N, *low.shape)."""
+        """Values (N, *low.shape) of `uniform` numbers (N, slots) in (0, 1)."""
         return np.asarray(self.low + (self.high - self.low) * uniform.reshape(len(uniform), *self.low.shape))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LogUniform(Uniform):
-    """Numbers whose logarithm is uniform, between low > 0 and high."""
+    """Numbers whose logarithm is uniform.
+
+    Attributes:
+        low, high: positive, of one shape, or they broadcast.
+
+    Raises:
+        InputError: a low that is not positive or lies above its high, or numbers that are not finite.
+        ShapeError: shapes that do not broadcast.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -147,7 +167,7 @@ class LogUniform(Uniform):
             raise InputError("LogUniform: low must be positive")
 
     def draw(self, uniform: Array) -> Array:
-        """(N, slots) -> (N, *low.shape)."""
+        """Values (N, *low.shape) of `uniform` numbers (N, slots) in (0, 1)."""
         low, high = np.log(self.low), np.log(self.high)
         return np.asarray(np.exp(low + (high - low) * uniform.reshape(len(uniform), *self.low.shape)))
 
@@ -179,7 +199,16 @@ def _listed(name: str, values: Any) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice(Distribution):
-    """One of some values (numbers, arrays along the first axis, or texts), with probabilities p or all alike."""
+    """One of some values, with probabilities p or all alike.
+
+    Attributes:
+        values: numbers, arrays along the first axis, or texts.
+        p: a probability a value.
+
+    Raises:
+        ShapeError: no values, or arrays of different shapes.
+        InputError: values of another kind or not finite; probabilities that are negative, not one a value or do not add to one.
+    """
 
     values: Any
     p: Any = None
@@ -197,7 +226,7 @@ class Choice(Distribution):
         return 1
 
     def draw(self, uniform: Array) -> Array:
-        """(N, 1) -> (N, *values.shape[1:])."""
+        """Values (N, *values.shape[1:]) of `uniform` numbers (N, 1) in (0, 1)."""
         count = len(self.values)
         steps = np.arange(1, count) / count if self.p is None else np.cumsum(self.p)[:-1]
         return np.asarray(self.values[np.searchsorted(steps, uniform[:, 0], side="right")])
@@ -205,9 +234,16 @@ class Choice(Distribution):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Distribution):
-    """All of some values (numbers, arrays along the first axis, or texts): several grids of a space make their product.
+    """All of some values: several grids of a space make their product.
 
     The samples run through the product in the order of nested loops, the last input fastest, and again from the start.
+
+    Attributes:
+        values: numbers, arrays along the first axis, or texts.
+
+    Raises:
+        ShapeError: no values, or arrays of different shapes.
+        InputError: values of another kind or not finite.
     """
 
     values: Any
@@ -231,6 +267,9 @@ class Joint(Distribution):
     Attributes:
         function: (N, slots) numbers in (0, 1) -> a tuple of (N, ...) arrays, one a name, or a dict of them.
         slots_each: uniform numbers of one sample.
+
+    Raises:
+        InputError: what is no function, or slots that are no whole number.
     """
 
     function: Callable[[Array], Any]
@@ -246,7 +285,15 @@ class Joint(Distribution):
         return self.slots_each
 
     def columns(self, names: tuple[str, ...], uniform: Array) -> Mapping[str, Array]:
-        """The values by name."""
+        """The values by name.
+
+        Args:
+            names: of the inputs.
+            uniform: (N, slots) numbers in (0, 1).
+
+        Raises:
+            ShapeError: an array that has not one value a sample along its first axis.
+        """
         made = self.function(uniform)
         pairs = made if isinstance(made, Mapping) else dict(zip(names, made, strict=True))
         columns = {name: np.asarray(pairs[name]) for name in names}

@@ -22,7 +22,7 @@ class WorkerLostError(Exception):
 
 @runtime_checkable
 class Engine(Protocol):
-    """Where calls run.
+    """Where calls run: a protocol, nothing that is made itself.
 
     Attributes:
         workers: how many run at once.

@@ -27,6 +27,11 @@ class OnGroup(Distribution):
         spread: None for Haar's measure, of a compact group; otherwise X = mean exp(hat xi), xi ~ N(0, spread^2):
             a number, (n,) standard deviations, or an (n, n) covariance.
         mean: (d, d) element, the identity if not given.
+
+    Raises:
+        UnknownGroupError: no such group.
+        InputError: no spread on a group that is not compact; a spread that is none.
+        ShapeError, NotOnGroupError: a mean that is no element; a spread of another shape.
     """
 
     group: GroupLike
@@ -63,7 +68,7 @@ class OnGroup(Distribution):
         return as_group(self.group)
 
     def draw(self, uniform: Array) -> Array:
-        """(N, slots) -> (N, d, d)."""
+        """Elements (N, d, d) of `uniform` numbers (N, slots) in (0, 1)."""
         group = self._group
         z = normal_quantile(uniform)
         if self.spread is not None:

@@ -39,7 +39,12 @@ class Replay:
 
 @guard_methods
 class Study:
-    """A study and its store; made by `lc.study`, opened again by `lc.studies.open_study`."""
+    """A study and its store; made by `lc.study`, read again by `lc.studies.open_study`.
+
+    Attributes:
+        place: the folder of the store, or the memory that holds it.
+        job: what is run; None of a study that was read from its files.
+    """
 
     def __init__(self, place: Any, store: Store, job: Job | None = None) -> None:
         self.place, self._store, self._job = place, store, job
@@ -107,7 +112,19 @@ class Study:
         )
 
     def quantiles(self, q: Sequence[float] = (0.05, 0.5, 0.95), names: Sequence[str] | None = None) -> dict[str, Array]:
-        """name -> (len(q), ...) quantiles of the outputs over the samples that are done and finite."""
+        """Quantiles of the outputs over the samples that are done and finite.
+
+        Args:
+            q: which, each in [0, 1].
+            names: of the outputs, all if not given.
+
+        Returns:
+            name -> (len(q), ...).
+
+        Raises:
+            InputError: no such output.
+            ArgumentError: a q outside [0, 1].
+        """
         good = self["status"] == SampleStatus.DONE
         found = {}
         for name in names if names is not None else self.outputs:
@@ -117,13 +134,29 @@ class Study:
         return found
 
     def worst(self, k: int = 5, by: str | None = None) -> list[Replay]:
-        """The k samples with the largest output `by` (the first number a sample if not given), run again; those without one first."""
+        """The k samples with the largest output, run again; those without one first.
+
+        Args:
+            k: how many.
+            by: an output that is a number a sample; the first of them if not given.
+
+        Raises:
+            InputError: no such output, one that is no number a sample, or a study that does not know what it ran.
+        """
         job = self._needs_job("worst")
         order = self.worst_indices(k, by)
         return [self.replay(int(i), job=job) for i in order]
 
     def worst_indices(self, k: int = 5, by: str | None = None) -> Array:
-        """Their indices."""
+        """Their indices: as `worst`, which runs them again.
+
+        Args:
+            k: how many.
+            by: an output that is a number a sample; the first of them if not given.
+
+        Raises:
+            InputError: no such output, or one that is no number a sample.
+        """
         named = by or next(
             (each for each in self.outputs if self[each].ndim == 1 and self[each].dtype.kind == "f"), None
         )
@@ -138,7 +171,15 @@ class Study:
         return np.asarray(order[run[order]][:k])
 
     def replay(self, index: int, *, job: Job | None = None) -> Replay:
-        """One sample, run again with all that its function returns."""
+        """One sample, run again with all that its function returns.
+
+        Args:
+            index: of the sample.
+            job: what is run, where the study was read from its files and does not know it.
+
+        Raises:
+            InputError: no such sample, or a study that does not know what it ran.
+        """
         job = job or self._needs_job("replay")
         if not 0 <= index < self._store.n:
             raise InputError(f"study: sample {index} of {self._store.n}")
@@ -161,6 +202,10 @@ class Study:
             path: file to write; None returns the figure.
             output: what to draw, all if not given.
             inputs: one or two numeric inputs against which the output is drawn.
+
+        Raises:
+            InputError: no such output or input.
+            MissingDependencyError: matplotlib is not installed.
         """
         from lie_codegen.pictures.study_picture import draw_study
 
@@ -175,7 +220,14 @@ class Study:
         return draw_study(data, against, path, labels=self._store.manifest.get("labels", {}))
 
     def wait(self, timeout: float | None = None) -> Study:
-        """Wait for a study begun with wait=False; raises what ended it."""
+        """Wait for a study begun with wait=False.
+
+        Args:
+            timeout: at most so long [s]; until it ends if not given.
+
+        Raises:
+            LieCodegenError: what ended it.
+        """
         if self._work is not None:
             self._work.wait(timeout)
         return self
@@ -191,7 +243,15 @@ class Study:
         return total.hexdigest()
 
     def to_parquet(self, path: str | Path) -> Path:
-        """A table with a row a sample and a column a number; entries of arrays as name_0, name_1, ..., complex ones as _re and _im."""
+        """A table with a row a sample and a column a number; entries of arrays as name_0, name_1, ..., complex ones as _re and _im.
+
+        Args:
+            path: of the file.
+
+        Raises:
+            ComputationError: pyarrow is not installed.
+            SystemRefusalError: the file cannot be written.
+        """
         try:
             import pyarrow
             from pyarrow import parquet

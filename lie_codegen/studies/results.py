@@ -40,7 +40,14 @@ class Each:
 
 
 def each(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of one sample, for a study: it takes the inputs by name and returns a number, an array, a result or a dict of them."""
+    """A function of one sample, for a study.
+
+    Args:
+        function: takes the inputs by name and returns a number, an array, a result or a dict of them.
+
+    Raises:
+        InputError: what cannot be called.
+    """
     if not callable(function):
         raise InputError(f"studies.each takes a function, got {function!r:.60}")
     return Each(function)

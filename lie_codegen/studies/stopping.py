@@ -25,6 +25,9 @@ class Quantile(Saved):
         q: the quantile, in (0, 1).
         width: of the interval, in the unit of the output.
         confidence: .95 if not given.
+
+    Raises:
+        InputError: an output that is no name, or a number outside its range.
     """
 
     output: str
@@ -41,7 +44,11 @@ class Quantile(Saved):
                 raise InputError(f"Quantile: {name} lies between {low:g} and {high:g}, given {value!r}")
 
     def interval(self, values: Array) -> tuple[float, float]:
-        """The confidence interval from the samples; infinite where they are too few."""
+        """The confidence interval; infinite where the samples are too few.
+
+        Args:
+            values: (n,) of the output, one a sample; NaN does not count.
+        """
         from scipy.stats import binom
 
         ordered = np.sort(values[~np.isnan(values)])
@@ -54,6 +61,10 @@ class Quantile(Saved):
         )
 
     def met(self, values: Array) -> bool:
-        """Whether the interval is narrow enough."""
+        """Whether the interval is narrow enough.
+
+        Args:
+            values: (n,) of the output, one a sample; NaN does not count.
+        """
         low, high = self.interval(values)
         return high - low <= self.width

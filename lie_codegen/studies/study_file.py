@@ -87,6 +87,10 @@ def read_study_file(path: str | Path) -> tuple[Run, dict[str, Any], dict[str, An
 def study_from_file(path: str | Path, **options: Any) -> Study:
     """Run the study of a TOML file (see the module); options of `lc.study` given here count instead of the file's.
 
+    Args:
+        path: of the file.
+        options: of `lc.study`.
+
     Raises:
         InputError: as `read_study_file` and `study`.
     """

@@ -55,6 +55,9 @@ class Run:
         arguments, options: what stays the same.
         reduce: what is kept of a result: result -> dict of arrays, the sample first; the summary of its kind if not given
             (see `lie_codegen.studies.summaries`).
+
+    Raises:
+        InputError: what cannot be called, as function or as reduce.
     """
 
     function: Any
@@ -87,6 +90,9 @@ class Run:
             columns: one value a sample.
             first: index of the first sample.
             noise: seed of the noise inside the samples.
+
+        Raises:
+            InputError: columns or options that the function does not take; an error inside a sample becomes its status.
         """
         count = len(next(iter(columns.values())))
         call = batched_call(self.function, self.arguments, self.options)
@@ -141,7 +147,16 @@ class Run:
         return {**found, "status": status}
 
     def replay(self, columns: Columns, index: int, seed: int) -> Any:
-        """The result of one sample, whole, with the inputs as a call of one would have them."""
+        """The result of one sample, whole, with the inputs as a call of one would have them.
+
+        Args:
+            columns: the inputs of the sample, one value each.
+            index: of the sample.
+            seed: of the study.
+
+        Raises:
+            LieCodegenError: whatever ended the sample.
+        """
         call = (
             replayed_call(self.function, self.arguments, self.options)
             or batched_call(self.function, self.arguments, self.options)

@@ -23,6 +23,12 @@ def allocation_kernel(
     Two-sided: u = W^-1 B' (B W^-1 B')^-1 f. One-sided: the same plus the least multiple of `balance` that makes every
     thrust positive. Then clipped to the limits, which may be "input"; residual = f - B u.
 
+    Args:
+        allocation: of `lc.allocation`: k thrusters.
+        limits: largest thrust: a number, (k,), or "input"; None for none. [N]
+        namespace: prefix of the C symbol.
+        name: C identifier.
+
     Raises:
         InputError: a limit that is not positive.
     """

@@ -25,14 +25,18 @@ from lie_codegen.kernel.linear import Vector, constant_matrix, identity, matvec,
 
 
 class Potential:
-    """V(X) with its force; (ops, X) -> (n,) force of position, as `variational_step` takes it."""
+    """V(X) with its force; (ops, X) -> (n,) force of position, as `variational_step` takes it.
+
+    Args:
+        group: a `MatrixGroup`.
+        V: a text or SymPy expression of X, as phi in `error_function`. [J]
+        parameters: name -> number.
+
+    Raises:
+        ExpressionError, InputError: outside the grammar; an entry of X_d, which a potential does not know.
+    """
 
     def __init__(self, group: MatrixGroup, V: Any, parameters: Mapping[str, Any] | None = None) -> None:
-        """V: a text or SymPy expression of X, as phi in `error_function`.
-
-        Raises:
-            ExpressionError, InputError: outside the grammar; an entry of X_d, which a potential does not know.
-        """
         self.group = group
         self.real = derivation_of(group).real
         self.data = refuse_inputs(error_function(group, V, parameters=parameters, name="potential"))
@@ -45,7 +49,12 @@ class Potential:
         return negative(self._at(ops, X).differential(1)[1])
 
     def energy(self, ops: Arithmetic, X: Any) -> Scalar:
-        """V(X)."""
+        """V(X). [J]
+
+        Args:
+            ops: an arithmetic.
+            X: (d, d) element, rows of its numbers.
+        """
         return self._at(ops, X).differential(1)[0]
 
     @property

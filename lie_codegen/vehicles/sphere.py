@@ -73,6 +73,10 @@ def sphere_law(n: int = 2, *, k_p: Any, k_d: Any, tunable: bool = False, name: s
 def sphere_gain_bound(q: Any, q_dot: Any, r: Any, r_dot: Any) -> float:
     """The k_p above which Lemma 5.1 proves convergence from this state; infinite at q = -r.
 
+    Args:
+        q, q_dot: (n,) unit vector and its rate.
+        r, r_dot: (n,) those of the reference.
+
     Raises:
         InputError: the vectors have different lengths.
     """

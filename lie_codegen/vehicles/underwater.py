@@ -205,6 +205,10 @@ def compensated(law: Kernel, vehicle: UnderwaterVehicle, name: str | None = None
         law: (X, xi, ...) -> (force, ...), as `tracking_law` makes it.
         vehicle: whose forces f are; its numbers that are "input" are inputs of the new law, behind those of the old one.
         name: C identifier, the law's own if None.
+
+    Raises:
+        IdentifierError: name is no C identifier.
+        ArgumentError: law is no kernel, or vehicle is none.
     """
     count, sampler = len(law.inputs), law.sampler
 

@@ -19,6 +19,14 @@ def commutator_free_step(group: GroupLike, name: str = "commutator_free_step") -
     X_next = X exp(h (u0/4 + um/3 - u1/12)) exp(h (-u0/12 + um/3 + u1/4)); u0, um, u1 are u at t, t + h/2, t + h.
     Exact on the group, global error O(h^4); |h u| <= 1/4 keeps the exponentials exact to rounding. It needs no
     brackets, so it pays where those of `rkmk4_step` are dense.
+
+    Args:
+        group: object, catalogue name or file.
+        name: C identifier.
+
+    Raises:
+        UnknownGroupError: no such group.
+        IdentifierError: name is no C identifier.
     """
 
     group = as_group(group, "commutator_free_step")

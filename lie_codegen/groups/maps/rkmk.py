@@ -91,7 +91,15 @@ def rkmk4_step(group: GroupLike, name: str = "rkmk4_step") -> Kernel:
     """One step of X' = X hat(u): (X, u0, um, u1, h) -> X_next, for `scan`.
 
     u0, um, u1 are u at t, t + h/2, t + h; exact on the group, global error O(h^4); |h u| <= 1/4 keeps the
-    exponential exact to rounding.
+    exponential exact to rounding. Munthe-Kaas, BIT 38 (1998) 92.
+
+    Args:
+        group: object, catalogue name or file.
+        name: C identifier.
+
+    Raises:
+        UnknownGroupError: no such group.
+        IdentifierError: name is no C identifier.
     """
 
     group = as_group(group, "rkmk4_step")
@@ -130,7 +138,18 @@ def flow_step(group: MatrixGroup, name: str, body: Body, formula: str, source: s
 
 @kernel_factory(group=as_group)
 def wei_norman_step(group: GroupLike, name: str = "wei_norman_step") -> Kernel:
-    """One classical RK4 step of g' = M(g) u: (g, u0, um, u1, h) -> g_next, for `scan`."""
+    """One classical RK4 step of g' = M(g) u: (g, u0, um, u1, h) -> g_next, for `scan`; TR 93-59, (12)-(15).
+
+    u0, um, u1 are u at t, t + h/2, t + h.
+
+    Args:
+        group: object, catalogue name or file.
+        name: C identifier.
+
+    Raises:
+        UnknownGroupError: no such group.
+        IdentifierError: name is no C identifier.
+    """
     group = as_group(group, "wei_norman_step")
     n = group.dim
     data = WeiNormanData(group)

@@ -86,7 +86,15 @@ class Uncertain(Saved):
         return Uncertain(self.group, np.linalg.inv(self.X), transported(adjoint, self.covariance), shift)
 
     def between(self, other: Uncertain, order: Literal[2, 4] = 4) -> Uncertain:
-        """self^-1 other, for independent elements."""
+        """self^-1 other, for independent elements.
+
+        Args:
+            other: of the same group.
+            order: as in `compound`.
+
+        Raises:
+            InputError: another group, or another order.
+        """
         self._same(other, "between")
         return self.inverse().compound(other, order)
 
@@ -116,7 +124,15 @@ class Uncertain(Saved):
         return Uncertain(self.group, self.X @ step, S, shift)
 
     def samples(self, count: int, seed: int = 0) -> Array:
-        """(count, d, d) random elements, xi Gaussian; the same for the same seed."""
+        """(count, d, d) random elements, xi Gaussian; the same for the same seed.
+
+        Args:
+            count: how many.
+            seed: of the generator of random numbers.
+
+        Raises:
+            ArgumentError: a count or a seed that is negative or no integer.
+        """
         rng = np.random.default_rng(seed)
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0))

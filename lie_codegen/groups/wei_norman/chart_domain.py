@@ -54,7 +54,14 @@ class ChartDomain(Saved):
 
 
 def chart_domain(group: GroupLike) -> ChartDomain:
-    """The domain of the Wei-Norman chart of a group in its basis order."""
+    """The domain of the Wei-Norman chart of a group in its basis order: where det M(g)^-1 keeps from 0, and how solutions may leave it.
+
+    Args:
+        group: object, catalogue name or file.
+
+    Raises:
+        UnknownGroupError: no such group.
+    """
     group = as_group(group, "chart_domain")
     if is_generic(group.algebra):
         return _numeric_domain(group)

@@ -27,6 +27,11 @@ def wei_norman_determinant(group: GroupLike, name: str = "wei_norman_determinant
     Args:
         group: object, catalogue name or file.
         name: C identifier.
+
+    Raises:
+        UnknownGroupError: no such group.
+        IdentifierError: name is no C identifier.
+        InputError: the exact determinant is beyond the limit of exact work.
     """
     group = as_group(group)
     wn = wei_norman(group)
@@ -51,6 +56,11 @@ def chart_margin(group: GroupLike, name: str = "chart_margin") -> Kernel:
     Args:
         group: object, catalogue name or file.
         name: C identifier.
+
+    Raises:
+        UnknownGroupError: no such group.
+        IdentifierError: name is no C identifier.
+        InputError: the exact determinant is beyond the limit of exact work.
     """
     group = as_group(group)
     domain = chart_domain(group)

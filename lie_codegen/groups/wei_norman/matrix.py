@@ -139,10 +139,16 @@ class WeiNorman(Saved):
 
 
 def wei_norman(group: GroupLike) -> WeiNorman:
-    """The exact Wei-Norman equations of a group in its basis order.
+    """The exact Wei-Norman equations g' = M(g) u of a group in its basis order, X = exp(g_1 A_1) ... exp(g_n A_n); TR 93-59, (12)-(15).
 
     M_inverse, determinant and M follow when they are read. The determinant is factored; that it never vanishes does not
     make the coordinates global: see `wei_norman_order`.
+
+    Args:
+        group: object, catalogue name or file.
+
+    Raises:
+        UnknownGroupError: no such group.
     """
     group = as_group(group, "wei_norman")
     symbols = tuple(sp.Symbol(f"g{k}") for k in range(1, group.dim + 1))

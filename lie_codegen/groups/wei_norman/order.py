@@ -70,6 +70,12 @@ def wei_norman_order(group: GroupLike) -> WeiNormanOrder:
     the radical after it, so that only the semisimple part limits the chart; up to four dimensions every order is tried.
     Where a change of basis does better (Iwasawa's K, A, N for a noncompact semisimple part, an adapted basis for a solvable
     algebra), it is offered beside. The present order wins ties.
+
+    Args:
+        group: object, catalogue name or file.
+
+    Raises:
+        UnknownGroupError: no such group.
     """
     group = as_group(group, "wei_norman_order")
     best, domain = group, chart_domain(group)

@@ -1,0 +1,29 @@
+"""The check of an array's shape: what is refused is named, with the shape that is taken."""
+
+from __future__ import annotations
+
+from types import EllipsisType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lie_codegen.arrays import Array
+from lie_codegen.errors import ShapeError
+
+
+def shaped(value: ArrayLike, shape: tuple[int | str | EllipsisType, ...], where: str) -> Array:
+    """The value as doubles of a shape: (3,), (..., 3) with any axes before, ("k", 3) with an axis of any length.
+
+    Raises:
+        ShapeError: naming `where`: no numbers, or another shape, with the one that is taken.
+    """
+    text = str(tuple(shape)).replace("Ellipsis", "...").replace("'", "")
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{where} must be numbers of shape {text}, given {value!r:.60}") from None
+    last = shape[1:] if shape[:1] == (...,) else shape
+    own = array.shape[max(0, array.ndim - len(last)) :] if last is not shape else array.shape
+    if len(own) != len(last) or any(isinstance(n, int) and n != m for n, m in zip(last, own, strict=True)):
+        raise ShapeError(f"{where} has shape {array.shape}; give {text}")
+    return array
