@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from lie_codegen.errors import ExpressionError
+from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, Numbers, Parser
 from lie_codegen.on_demand import sympy as sp
 
@@ -121,7 +122,7 @@ class Matrices(Numbers):
     def multiply(self, a: Value, b: Value) -> Value:
         if isinstance(a, sp.MatrixBase) and isinstance(b, sp.MatrixBase) and a.cols != b.rows:
             raise ExpressionError(f"{a.rows} x {a.cols} times {b.rows} x {b.cols} has no meaning")
-        return a * b
+        return _product(a, b) if isinstance(a, sp.MatrixBase) and isinstance(b, sp.MatrixBase) else a * b
 
     def divide(self, a: Value, b: Value) -> Value:
         if isinstance(b, sp.MatrixBase) or b.is_zero:
@@ -143,7 +144,7 @@ class Matrices(Numbers):
             raise ExpressionError("of matrices only X^-1 and Xd^-1 are known inverses")
         if base.rows != base.cols:
             raise ExpressionError(f"a {base.rows} x {base.cols} matrix has no powers")
-        return sp.ImmutableMatrix(base**exponent)
+        return _power(sp.ImmutableMatrix(base), int(exponent))
 
     def name(self, text: str) -> Value:
         if text not in self.names:
@@ -184,6 +185,50 @@ class Matrices(Numbers):
                 return each.coordinates
         what = "log takes Xd^-1*X or X*Xd^-1" if text == "log" else "vee takes a log of these: vee(log(Xd^-1*X))"
         raise ExpressionError(f"of matrices {what}")
+
+
+def _power(base: sp.ImmutableMatrix, exponent: int) -> sp.ImmutableMatrix:
+    """By squaring. SymPy's own power simplifies every entry on the way, which takes it half a minute for (X^2)^4 of a 4 x 4 matrix."""
+    result, square = sp.ImmutableMatrix(sp.eye(base.rows)), base
+    while exponent:
+        if exponent % 2:
+            result = _product(result, square)
+        exponent //= 2
+        if exponent:
+            square = _product(square, square)
+    return result
+
+
+def _product(a: sp.MatrixBase, b: sp.MatrixBase) -> sp.ImmutableMatrix:
+    """a b, not multiplied out.
+
+    In memory the entries share their parts, so that it is small whatever the powers; but all that follows (derivatives, C) goes through
+    every part as often as it is written. So it is the length of the written formula that counts, and it is known before it is made.
+
+    Raises:
+        ExpressionError: the length is over the budget.
+    """
+    known: dict[sp.Basic, int] = {}
+    left, right = ([_length(entry, known) for entry in matrix.flat()] for matrix in (a, b))
+    total = sum(
+        left[i * a.cols + k] + right[k * b.cols + j]
+        for i in range(a.rows)
+        for k in range(a.cols)
+        for j in range(b.cols)
+        if a[i, k] != 0 and b[k, j] != 0
+    )
+    if total > current_budget().products:
+        raise ExpressionError(
+            over("products", f"a product of matrices is {total} terms and factors long when written out")
+        )
+    return sp.ImmutableMatrix(a * b)
+
+
+def _length(value: sp.Basic, known: dict[sp.Basic, int]) -> int:
+    """Numbers and symbols in a formula as it is written; parts that are the same are gone through once."""
+    if value not in known:
+        known[value] = sum(_length(part, known) for part in value.args) or 1
+    return known[value]
 
 
 def _aligned(a: Value, b: Value) -> tuple[Value, Value]:

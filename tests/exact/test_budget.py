@@ -8,6 +8,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 
@@ -17,6 +18,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import current_budget, field_degree
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, parse_number
 from lie_codegen.exact.numbers import exact_number, field_elements
+from lie_codegen.kernel.matrix_formula import scalar_formula
 
 
 @pytest.fixture(autouse=True)
@@ -143,3 +145,26 @@ def test_an_exact_matrix_of_too_many_products() -> None:
     assert domain.truncated
     assert domain.text.startswith("numeric, not proved")
     assert not lc.chart_domain(group).truncated
+
+
+@pytest.mark.parametrize("text", ["tr((X^2)^4)", "tr(X'*X^7)", "norm2(X^3 - X')"])
+def test_products_of_symbolic_matrices_are_those_of_their_numbers(text: str) -> None:
+    """SymPy's own power took half a minute for the first."""
+    numbers = np.random.default_rng(0).integers(-3, 4, (4, 4))
+    symbols = sp.ImmutableMatrix(4, 4, sp.symbols("x:16", real=True))
+    found = scalar_formula(text, {"X": symbols}, {}, {"X": symbols}).subs(
+        dict(zip(symbols, numbers.ravel(), strict=True))
+    )
+    power = np.linalg.matrix_power
+    expected = {
+        "tr((X^2)^4)": np.trace(power(numbers, 8)),
+        "tr(X'*X^7)": np.trace(numbers.T @ power(numbers, 7)),
+        "norm2(X^3 - X')": np.sum((power(numbers, 3) - numbers.T) ** 2),
+    }
+    assert found == int(expected[text])
+
+
+@pytest.mark.parametrize("text", ["tr(((X^16)^16)^16)", "tr((1 - Xd^-1*X)^16)", "tr(" + "*".join(["X"] * 99) + ")"])
+def test_a_product_of_matrices_too_long_to_write_out(text: str) -> None:
+    with pytest.raises(InputError, match="the limit of products is 500000"):
+        lc.error_function("se3", text)
