@@ -493,7 +493,7 @@ static int descend(const problem *task, const rules *rule, point *at, int *done)
                     && LANE(at->E, l) <= rule->near;
             }
             finished += done[l];
-            if (!done[l] && (bold || LANE(lambda, l) < 1e4)) {
+            if (!done[l] && (bold || LANE(lambda, l) < MOST_DAMPING)) {
                 ++busy;
                 open = fmax(open, F);
             }
@@ -918,7 +918,7 @@ static void search(problem *task, const steering_options *options, int first, in
     rule.exact = NULL;
     rule.most = options->search_iterations;
     rule.enough = size * options->search_tolerance;
-    rule.near = 1e-2 * size;
+    rule.near = SEARCH_RESIDUAL * size;
     rule.wanted = LANES - LANES / 4;
     memset(at, 0, sizeof *at);
     for (; first < last || (list->count == 0 && first < 4 * last); first += LANES) {
@@ -957,7 +957,7 @@ static void polish(int count, const double *targets, problem *task, const steeri
     rule.steps = even(options->polish_steps);
     rule.exact = &steps;
     rule.most = options->polish_iterations;
-    rule.enough = 0.01 * near;
+    rule.enough = POLISH_SHARE * near;
     rule.near = near;
     rule.wanted = LANES;
     rule.scaled = 1;

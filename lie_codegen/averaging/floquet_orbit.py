@@ -20,7 +20,6 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.mechanics.vibrational_average import VibrationalAverage
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import Motion
 
@@ -84,8 +83,16 @@ class AveragedMotion(Protocol):
         """The field of the slow variables, their values on the motion through (X, omega), and their units."""
 
 
+@runtime_checkable
+class VibratedMotion(Protocol):
+    """An average of a vibrated system that knows the actual one: of lc.vibrational_average."""
+
+    def actual_motion(self, eps: float) -> tuple[Kernel, str, float]:
+        """(y, fast time, eps, ...) -> y' of the actual system, the name of the fast time, and the period in slow time."""
+
+
 def floquet(
-    rates: Sequence[Any] | Kernel | VibrationalAverage | AveragedFlow | AveragedMotion | ClosedLoop,
+    rates: Sequence[Any] | Kernel | VibratedMotion | AveragedFlow | AveragedMotion | ClosedLoop,
     variables: Sequence[str] | None = None,
     guess: ArrayLike | None = None,
     *,
@@ -126,13 +133,13 @@ def floquet(
                 "floquet: of a closed loop only period= and transient= are taken; its last state is the guess"
             )
         return loop_orbit(rates, period, transient)
-    if isinstance(rates, VibrationalAverage):
+    if isinstance(rates, VibratedMotion):
         eps = float((parameters or {}).get("eps", np.nan))
         if not eps > 0:
             raise InputError("floquet: a vibrated system needs parameters={'eps': ...}, the ratio of its time scales")
-        actual = next(kernel for kernel in rates.kernels() if kernel.name == "actual")
-        kernels = kernel_orbit_kernels(actual, dict(parameters or {}), "tau", 1 / eps)
-        period = eps * float(rates.fields.period) if period is None else period
+        actual, fast_time, own = rates.actual_motion(eps)
+        kernels = kernel_orbit_kernels(actual, dict(parameters or {}), fast_time, 1 / eps)
+        period = own if period is None else period
         driven = True
     elif isinstance(rates, AveragedMotion):
         return _orbit_of_motion(rates, guess, period, transient, return_to)

@@ -1,7 +1,7 @@
 """Laws in files: a TOML description of a law, read as data.
 
-law = "tracking"                        # tracking, attitude or integral
-group = "so3"                           # of tracking and integral laws; the one asked for if missing
+law = "tracking"                        # any `<law>_law` of lie_codegen.control: tracking, attitude, integral, pointing, ...
+group = "so3"                           # of laws on any group; the one asked for if missing
 inertia = [1, 2, 3]                     # numbers, exact texts ("1/3"), or "input"
 error = "so3_right"
 gains = { K_p = [4, 5, 6], K_d = 6 }
@@ -14,26 +14,27 @@ import inspect
 import tomllib
 from collections.abc import Callable, Mapping
 from decimal import Decimal
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.control.attitude_law import attitude_law
-from lie_codegen.control.integral_law import integral_law
-from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.kernel import Kernel
 
-_LAWS: Mapping[str, Callable[..., Kernel]] = {
-    "tracking": tracking_law,
-    "attitude": attitude_law,
-    "integral": integral_law,
-}
+#: What a law's function is called, behind the law's own name.
+_SUFFIX = "_law"
+
+
+def _laws() -> Mapping[str, str]:
+    """The public laws of this folder: what a file calls it -> its function. A new one joins by its line in `__init__.pyi`."""
+    names = import_module("lie_codegen.control").__all__
+    return {name.removesuffix(_SUFFIX): name for name in names if name.endswith(_SUFFIX) and name != "read_law"}
 
 
 def read_law(path: str | Path, group: GroupLike | None = None) -> Kernel:
-    """The law that a TOML file describes: `law` says which, its other keys are the arguments of `tracking_law`, `attitude_law` or
-    `integral_law`, with every number exact.
+    """The law that a TOML file describes: `law` says which, its other keys are the arguments of `lc.<law>_law`, with every number
+    exact.
 
     Args:
         path: the file.
@@ -43,16 +44,11 @@ def read_law(path: str | Path, group: GroupLike | None = None) -> Kernel:
         InputError: no such file, no TOML, an unknown law or argument, another group than the file's, or what the law itself
             refuses; names the file.
     """
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"), parse_float=Decimal)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
-    except (ValueError, ArithmeticError, RecursionError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from None
-    kind = table.pop("law", None)
-    if kind not in _LAWS:
-        raise InputError(f'{path}: law = {kind!r} is not known; write law = one of "{", ".join(_LAWS)}"')
-    make = _LAWS[kind]
+    table = _table(path)
+    kind, laws = table.pop("law", None), _laws()
+    if kind not in laws:
+        raise InputError(f'{path}: law = {kind!r} is not known; write law = one of "{", ".join(sorted(laws))}"')
+    make: Callable[..., Any] = getattr(import_module("lie_codegen.control"), laws[kind])
     known = set(inspect.signature(make).parameters)
     unknown = sorted(set(table) - known - {"group"})
     if unknown:
@@ -62,19 +58,36 @@ def read_law(path: str | Path, group: GroupLike | None = None) -> Kernel:
     own = table.pop("group", None)
     if own is not None and group is not None and as_group(own, "read_law") != as_group(group, "read_law"):
         raise InputError(f"{path}: a law on {own}, not on {as_group(group, 'read_law').name}")
-    if kind == "attitude":
-        if group is not None and as_group(group, "read_law").name != "so3":
-            raise InputError(f"{path}: attitude laws are laws on so3")
-    elif own is None and group is None:
-        raise InputError(f'{path}: add group = "..." (a catalogue name or a file)')
-    else:
-        table["group"] = own if own is not None else group
+    asked = own if own is not None else group
+    if "group" in known:
+        if asked is None:
+            raise InputError(f'{path}: add group = "..." (a catalogue name or a file)')
+        table["group"] = asked
+    law = _made(path, make, table)
+    if asked is not None and as_group(asked, "read_law").name != law.namespace:
+        raise InputError(f"{path}: {kind} laws are laws on {law.namespace}")
+    return law
+
+
+def _table(path: str | Path) -> dict[str, Any]:
     try:
-        return make(**{key: _exact(value) for key, value in table.items()})
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"), parse_float=Decimal)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from None
+    except (ValueError, ArithmeticError, RecursionError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from None
+
+
+def _made(path: str | Path, make: Callable[..., Any], table: Mapping[str, Any]) -> Kernel:
+    """The kernel of the law; refusals begin with the file."""
+    try:
+        made = make(**{key: _exact(value) for key, value in table.items()})
     except TypeError as error:
         raise InputError(f"{path}: {error}") from None
     except InputError as error:
         raise type(error)(f"{path}: {error}") from None
+    law: Kernel = made if isinstance(made, Kernel) else made.kernel
+    return law
 
 
 def _exact(value: Any) -> Any:

@@ -162,6 +162,11 @@ class VibrationalAverage(Saved):
         step = eps * float(self.fields.period) / 12
         return integrate(lambda time, y: rate(y, time / eps, eps, *given), y0, t, rtol, step)
 
+    def actual_motion(self, eps: float) -> tuple[Kernel, str, float]:
+        """For lc.floquet: the kernel of the actual system, the name of its fast time, and the period of the forces in slow time."""
+        actual = next(kernel for kernel in self.kernels() if kernel.name == "actual")
+        return actual, "tau", eps * float(self.fields.period)
+
     def start(
         self, y0: ArrayLike, eps: float, parameters: Mapping[str, ArrayLike] | None = None, tau: float = 0.0
     ) -> Array:

@@ -30,7 +30,7 @@ width = 0.01
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -49,14 +49,8 @@ _FUNCTIONS = {
     "steer": (steering, "steer"),
     "order_check": (averaging, "order_check"),
 }
-#: What `make` may name: things that follow from plain data.
-_MAKERS = {
-    **{
-        name: (control, name)
-        for name in ("attitude_law", "tracking_law", "integral_law", "error_function", "reference")
-    },
-    **{name: (signals, name) for name in ("PeriodicInput", "SampledInput", "ParametricInput")},
-}
+#: Where what `make` may name is public: factories of laws, error functions and references, and inputs.
+_MAKERS = (control, signals)
 _DISTRIBUTIONS = ("Normal", "Uniform", "LogUniform", "Choice", "Grid", "Sobol", "LatinHypercube", "OnGroup")
 _LIMIT = 1_000_000
 
@@ -134,11 +128,19 @@ def _value(where: str, value: Any) -> Any:
     if "make" not in value:
         return {key: _value(f"{where}.{key}", each) for key, each in value.items()}
     name = value["make"]
-    if name not in _MAKERS:
-        raise InputError(f"{where}: make is one of {', '.join(_MAKERS)}; given {name!r}")
-    room, attribute = _MAKERS[name]
+    make = _maker(where, name)
     arguments = {key: _value(f"{where}.{key}", each) for key, each in value.items() if key != "make"}
-    return _called(where, getattr(room, attribute), arguments)
+    return _called(where, make, arguments)
+
+
+def _maker(where: str, name: Any) -> Callable[..., Any]:
+    for room in _MAKERS:
+        if name in room.__all__:
+            made: Callable[..., Any] = getattr(room, name)
+            # what follows from plain data alone; `lc.read_law`, which opens a file, does not
+            if room is signals or getattr(made, "__makes_defined__", False):
+                return made
+    raise InputError(f"{where}: make is one of a law, an error function, a reference or an input; given {name!r}")
 
 
 def _space(where: str, table: Mapping[str, Any]) -> dict[str, Any]:

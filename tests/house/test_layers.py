@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -61,27 +61,63 @@ def layer_of(parts: tuple[str, ...]) -> str | None:
     return first if first in LAYERS else None
 
 
+#: What is loaded from above by its name alone, when it is asked for: (file, module). Each is a hook that its own file explains.
+BY_NAME = {
+    ("kernel/definition.py", "lie_codegen.runtime.recorded_kernels"),
+    ("kernel/definition.py", "lie_codegen.groups.definition"),
+    ("groups/generate.py", "lie_codegen.steering.shooting.package"),
+}
+
+
 @dataclass
 class Noted:
     """What these tests ask of a file, from one walk through it."""
 
-    imports: list[ast.Import | ast.ImportFrom] = field(default_factory=list)
+    imports: set[str] = field(default_factory=set)
+    named: set[str] = field(default_factory=set)
     called: set[str] = field(default_factory=set)
     has_assert: bool = False
     has_bare_except: bool = False
 
 
-@cache
-def noted(path: Path) -> Noted:
-    found = Noted()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            found.imports.append(node)
+def noted_in(source: str, package: str) -> Noted:
+    """Of a file of that package: every import wherever it stands, in full, and modules of ours that texts name."""
+    found, documentation = Noted(), set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            documentation.add(id(node.value))
+        if isinstance(node, ast.Import):
+            found.imports |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.imports |= imported_from(node, package)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documentation:
+            found.named |= set(re.findall(r"\blie_codegen(?:\.\w+)+", node.value))
         elif isinstance(node, ast.Call):
             found.called.add(dotted(node.func))
         found.has_assert |= isinstance(node, ast.Assert)
         found.has_bare_except |= isinstance(node, ast.ExceptHandler) and node.type is None
     return found
+
+
+def imported_from(node: ast.ImportFrom, package: str) -> set[str]:
+    """The modules, or what is taken from a module where that is none: `from lie_codegen import control` imports lie_codegen.control."""
+    above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+    home = ".".join([*above, *([node.module] if node.module else [])])
+    if home != "lie_codegen" and not home.startswith("lie_codegen."):
+        return {home}
+    inner = {alias.name: f"{home}.{alias.name}" for alias in node.names}
+    modules = {full for name, full in inner.items() if is_module(full) or home == "lie_codegen"}
+    third = set(inner) if home == "lie_codegen.on_demand" else set()
+    return modules | third | ({home} if len(modules) < len(inner) and home != "lie_codegen" else set())
+
+
+@cache
+def noted(path: Path) -> Noted:
+    return noted_in(path.read_text(encoding="utf-8"), ".".join(("lie_codegen", *path.relative_to(PACKAGE).parts[:-1])))
+
+
+def module_of(path: Path) -> str:
+    return ".".join(("lie_codegen", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
 
 
 def dotted(node: ast.expr) -> str:
@@ -91,54 +127,90 @@ def dotted(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def imports(path: Path) -> Iterator[str]:
-    for node in noted(path).imports:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield node.module
-            if node.module == "lie_codegen.on_demand":
-                yield from (alias.name for alias in node.names)
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_point_down_and_stay_in_their_layer(path: Path) -> None:
-    mine = layer_of(path.relative_to(PACKAGE).parts)
-    for name in imports(path):
+def check_layers(file: str, found: Noted) -> None:
+    """Imports of a file point down and stay in their layer, and so do modules that it names."""
+    mine = layer_of(Path(file).parts)
+    for name in found.imports:
         root, *rest = name.split(".")
         if root == "lie_codegen":
             theirs = layer_of(tuple(rest))
             if mine and theirs:
                 assert LAYERS.index(theirs) <= LAYERS.index(mine), f"{mine} imports {name}"
             elif not mine:
-                assert theirs is None or path.name == "__main__.py", f"{path.name} imports {name}"
+                assert theirs in (None, "door") or file == "__main__.py", f"{file} imports {name}"
         elif root not in sys.stdlib_module_names:
-            assert root in ALLOWED, f"{path.name} imports {name}: not a known dependency"
+            assert root in ALLOWED, f"{file} imports {name}: not a known dependency"
             assert mine in ALLOWED[root], f"{mine} imports {name}"
+    for name in found.named:
+        theirs = layer_of(tuple(name.split(".")[1:]))
+        if mine and theirs and LAYERS.index(theirs) > LAYERS.index(mine):
+            assert (file, name) in BY_NAME, f"{mine} names {name}, which lies above"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_down_and_stay_in_their_layer(path: Path) -> None:
+    check_layers(path.relative_to(PACKAGE).as_posix(), noted(path))
+
+
+@pytest.mark.parametrize(
+    "planted",
+    [
+        "from lie_codegen.control.closed_loop import closed_loop",
+        "import lie_codegen.control.closed_loop",
+        "def lazy():\n    from lie_codegen.control import closed_loop",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from lie_codegen.control.closed_loop import closed_loop",
+        "from lie_codegen import control",
+        "from ..control.closed_loop import closed_loop",
+        "from .. import control",
+        "def lazy():\n    import scipy.linalg",
+        "from importlib import import_module\nloop = import_module('lie_codegen.control.closed_loop')",
+        "HOME = 'lie_codegen.control.closed_loop:closed_loop'",
+    ],
+)
+def test_an_import_that_points_up_is_found_wherever_it_stands(planted: str) -> None:
+    with pytest.raises(AssertionError):
+        check_layers("kernel/planted.py", noted_in(planted, "lie_codegen.kernel"))
+
+
+def circle_in(graph: dict[str, set[str]]) -> tuple[str, ...]:
+    """Modules that import each other in a circle; none if there is none."""
+    state: dict[str, int] = {}
+
+    def visit(module: str, trail: tuple[str, ...]) -> tuple[str, ...]:
+        if state.get(module) == 1:
+            return (*trail, module)
+        if state.get(module) == 2:
+            return ()
+        state[module] = 1
+        for other in sorted(graph.get(module, ())):
+            circle = visit(other, (*trail, module))
+            if circle:
+                return circle
+        state[module] = 2
+        return ()
+
+    return next((circle for module in graph if (circle := visit(module, ()))), ())
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    graph: dict[str, set[str]] = {}
-    for path in FILES:
-        module = ".".join(("lie_codegen", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
-        graph[module] = set()
-        for node in noted(path).imports:
-            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("lie_codegen"):
-                inner = (f"{node.module}.{alias.name}" for alias in node.names)
-                graph[module] |= {name if is_module(name) else node.module for name in inner}
-    state: dict[str, int] = {}
+    graph = {module_of(path): noted(path).imports for path in FILES}
+    assert not circle_in(graph)
 
-    def visit(module: str, trail: tuple[str, ...]) -> None:
-        assert state.get(module) != 1, " -> ".join((*trail, module))
-        if state.get(module) == 2:
-            return
-        state[module] = 1
-        for other in sorted(graph.get(module, ())):
-            visit(other, (*trail, module))
-        state[module] = 2
 
-    for module in graph:
-        visit(module, ())
+@pytest.mark.parametrize(
+    "planted",
+    [
+        "from lie_codegen.kernel.records import encoded",
+        "def lazy():\n    from lie_codegen.kernel import records",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lie_codegen.kernel.records",
+        "from .records import encoded",
+    ],
+)
+def test_a_circle_is_found_however_it_closes(planted: str) -> None:
+    graph = {module_of(path): noted(path).imports for path in FILES}
+    assert "lie_codegen.kernel.plain_data" in graph["lie_codegen.kernel.records"]
+    planted_imports = noted_in(planted, "lie_codegen.kernel").imports
+    assert circle_in({**graph, "lie_codegen.kernel.plain_data": planted_imports})
 
 
 def is_module(name: str) -> bool:

@@ -164,8 +164,12 @@ def test_law_files(tmp_path: Path) -> None:
     assert lc.read_law(file) == lc.attitude_law("pd", inertia=(1, 2, 3), k_p=4, k_d=6)
     with pytest.raises(InputError, match="laws on so3"):
         lc.read_law(file, "se3")
+    file.write_text('law = "pointing"\naxis = [0, 0, 1]\ninertia = [1, 2, 3]\nk_p = 4\nK_d = 6\n')
+    assert lc.read_law(file) == lc.pointing_law([0, 0, 1], inertia=[1, 2, 3], k_p=4, K_d=6)
     for text, words in (
         ('law = "pid"', "not known"),
+        ('law = "manifold"\nmanifold = 2', "law.toml: "),
+        ('law = "attitude"\ngroup = "se3"', "laws on so3"),
         ('law = "attitude"\nkp = 4', "takes no kp"),
         ("law = ", "not a TOML file"),
         (

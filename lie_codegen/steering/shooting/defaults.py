@@ -16,6 +16,11 @@ class Defaults:
         polish_steps, polish_iterations: the same while polishing.
         search_tolerance: predicted decrease of |X - target|^2 at which a start counts as converged.
         tolerance: |X - target| at which a target counts as solved.
+        search_residual: |X - target|^2 above which no start counts as converged.
+        polish_share: of tolerance^2, to which polishing brings |X - target|^2: the flow's own error is to stay small beside it.
+        most_damping: of Levenberg and Marquardt; a start that wants more has stalled.
+
+    These are the numbers of when shooting stops, in C (`steering_problem.h`) and in numpy alike.
     """
 
     starts: int
@@ -25,6 +30,9 @@ class Defaults:
     polish_iterations: int = 60
     search_tolerance: float = 1e-7
     tolerance: float = 1e-10
+    search_residual: float = 1e-2
+    polish_share: float = 0.01
+    most_damping: float = 1e4
 
     @staticmethod
     def of(dim: int, depth: int) -> Defaults:

@@ -100,13 +100,14 @@ class NumpyShooting:
         """Levenberg-Marquardt on every row of p: points, |X(1) - target|^2, which are done, linearisations."""
         damping = np.full(len(p), 1e-12 if exact else 1e-2)
         F, g, H = self._linearise(p, target, weights, steps)
-        enough = 0.01 * self._defaults.tolerance**2 if exact else self._defaults.search_tolerance
+        options = self._defaults
+        enough = options.polish_share * options.tolerance**2 if exact else options.search_tolerance
         n = self._group.dim
         for iteration in range(most + 1):
             shift = damping * np.trace(H, axis1=1, axis2=2) / n + 1e-300
             s = -np.linalg.solve(H + shift[:, None, None] * np.eye(n), g[..., None])[..., 0]
-            done = enough > F if exact else (-np.sum(s * g, axis=1) < enough) & (F < 1e-2)
-            if iteration == most or np.all(done | (damping >= 1e4)):
+            done = enough > F if exact else (-np.sum(s * g, axis=1) < enough) & (options.search_residual > F)
+            if iteration == most or np.all(done | (damping >= options.most_damping)):
                 break
             reach = 1 + 0.5 * np.linalg.norm(p, axis=1)
             size = np.linalg.norm(s, axis=1)
