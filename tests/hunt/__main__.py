@@ -1,16 +1,16 @@
 """The hunt: `python -m tests.hunt [--scale N] [--write]` tries to break what SECURITY.md promises, prints a table, and with --write puts it there.
 
-A scale of 1 takes some minutes, 10 is the slow job (under two hours on two cores). The status is 1 if anything was found.
+A scale of 1 takes half an hour on one core, 10 is the slow job. The status is 1 if anything was found. Each part's row is kept as the part ends: an
+interrupted hunt has its figures, and `--resume` goes on with the parts that are not in the table at this scale and commit.
 """
 
 from __future__ import annotations
 
 import argparse
-import platform
-import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,13 +23,12 @@ from tests.hunt import (
     hostile,
     methods,
     off_manifold,
+    rows,
     solver_arguments,
     texts,
     warnings_matrix,
 )
 
-PAGE = Path(__file__).resolve().parents[2] / "SECURITY.md"
-BEGIN, END = "<!-- hunt: begin -->", "<!-- hunt: end -->"
 Part = Callable[[], tuple[int, list[str]]]
 
 
@@ -78,59 +77,42 @@ def _calls(scale: int) -> tuple[int, list[str]]:
         return hostile.hunt(min(1.0, 0.03 * scale))
 
 
-def table(rows: list[tuple[str, int, int, float]]) -> str:
-    """The figures as Markdown."""
-    lines = ["| hunted | tried | found | seconds |", "|---|---|---|---|"]
-    lines += [f"| {what} | {tried:,} | {found} | {seconds:.0f} |" for what, tried, found, seconds in rows]
-    return "\n".join(lines)
-
-
-def read_table(text: str) -> list[tuple[str, int, int, float]]:
-    """The figures of `table`."""
-    cells = [
-        [cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ")
-    ]
-    return [
-        (what, int(tried.replace(",", "")), int(found), float(seconds)) for what, tried, found, seconds in cells[1:]
-    ]
-
-
-def joined(
-    old: list[tuple[str, int, int, float]], new: list[tuple[str, int, int, float]], order: list[str]
-) -> list[tuple[str, int, int, float]]:
-    """The rows of parts that there are, the new one of each where it was hunted again."""
-    rows = {row[0]: row for row in (*old, *new)}
-    return [rows[what] for what in order if what in rows]
+def hunted(part: Part) -> tuple[int, list[str]]:
+    """What a part found; one that breaks has found that."""
+    try:
+        return part()
+    except Exception:
+        return 1, [traceback.format_exc()]
 
 
 def main() -> int:
-    """Hunt, print, and write if asked."""
+    """Hunt, keep a row a part, print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scale", type=int, default=1)
-    parser.add_argument("--only", default="", help="parts whose name holds this; the others keep their rows")
-    parser.add_argument("--write", action="store_true", help="put the table into SECURITY.md")
+    parser.add_argument("--only", default="", help="parts whose name holds this")
+    parser.add_argument("--write", action="store_true", help="keep the rows in SECURITY.md")
+    parser.add_argument("--rows", type=Path, help="keep the rows in this file instead, under the same two marks")
+    parser.add_argument(
+        "--resume", action="store_true", help="leave out the parts that have a row of this scale and commit"
+    )
     asked = parser.parse_args()
-    rows, finds = [], []
+    page = asked.rows or (rows.PAGE if asked.write else None)
+    had = rows.read(page) if page else []
+    new: list[rows.Row] = []
     with tempfile.TemporaryDirectory(prefix="hunt-") as folder:
         every = parts(asked.scale, Path(folder))
+        commit = rows.commit()
+        kept = {row.hunted for row in had if asked.resume and (row.scale, row.commit) == (asked.scale, commit)}
         for what, part in every.items():
-            if asked.only in what:
+            if asked.only in what and what not in kept:
                 began = time.perf_counter()
-                tried, found = part()
-                rows.append((what, tried, len(found), time.perf_counter() - began))
-                finds += found
+                tried, found = hunted(part)
+                new.append(rows.Row(what, asked.scale, commit, tried, len(found), round(time.perf_counter() - began)))
                 print(f"{what}: {tried:,} tried, {len(found)} found", *found, sep="\n", flush=True)  # noqa: T201
-    print(table(rows))  # noqa: T201
-    if asked.write:
-        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        before, _, tail = rest.partition(END)
-        text = table(joined(read_table(before), rows, list(every)) if asked.only else rows)
-        commit = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
-        ).stdout.strip()
-        about = f"Scale {asked.scale}, commit {commit or 'unknown'}, Python {platform.python_version()}, {platform.system()} {platform.machine()}."
-        PAGE.write_text(f"{head}{BEGIN}\n{about}\n\n{text}\n{END}{tail}", encoding="utf-8")
-    return 1 if finds else 0
+                if page:
+                    rows.write(page, rows.joined(had, new, list(every)))
+    print(rows.table(rows.joined(had, new, list(every))))  # noqa: T201
+    return 1 if any(row.found for row in new) else 0
 
 
 if __name__ == "__main__":

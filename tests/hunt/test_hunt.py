@@ -16,12 +16,11 @@ from tests.hunt import (
     hostile,
     methods,
     off_manifold,
+    rows,
     solver_arguments,
     texts,
     warnings_matrix,
 )
-
-SECURITY = Path(__file__).resolve().parents[2] / "SECURITY.md"
 
 
 def test_only_errors_of_ours_leave_the_front_door() -> None:
@@ -130,14 +129,46 @@ def test_analysers_have_nothing_to_say(tmp_path: Path) -> None:
 
 
 def test_the_page_has_the_figures_of_the_last_hunt() -> None:
-    text = SECURITY.read_text(encoding="utf-8")
-    figures = text.partition(whole.BEGIN)[2].partition(whole.END)[0]
-    rows = [line for line in figures.splitlines() if line.startswith("| ") and not line.startswith("| hunted")]
-    assert len(rows) >= 10
-    assert all(int(row.split("|")[2].replace(",", "")) > 0 for row in rows)
+    figures = rows.read(rows.PAGE)
+    assert len(figures) >= 10
+    assert all(row.tried > 0 and row.scale > 0 for row in figures)
 
 
-def test_a_part_hunted_again_replaces_its_row_alone() -> None:
-    old = [("a", 1000, 0, 3.0), ("gone", 5, 0, 1.0), ("b", 7, 1, 20.0)]
-    assert whole.read_table(whole.table(old)) == old
-    assert whole.joined(old, [("b", 9, 0, 2.0)], ["a", "b", "c"]) == [("a", 1000, 0, 3.0), ("b", 9, 0, 2.0)]
+def test_a_part_hunted_again_replaces_its_row_alone(tmp_path: Path) -> None:
+    old = [rows.Row("a", 1, "0", 1000, 0, 3), rows.Row("gone", 1, "0", 5, 0, 1), rows.Row("b", 1, "0", 7, 1, 20)]
+    assert rows.parsed(rows.table(old)) == old
+    new = rows.Row("b", 10, "1", 9, 0, 2)
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{rows.BEGIN}{rows.END}\nafter\n")
+    rows.write(page, rows.joined(old, [new], ["a", "b", "c"]))
+    assert rows.read(page) == [old[0], new]
+    assert page.read_text().startswith("before\n")
+    assert page.read_text().endswith("\nafter\n")
+
+
+def test_an_interrupted_hunt_keeps_its_rows_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    hunted: list[str] = []
+    stop = [True]
+
+    def first() -> tuple[int, list[str]]:
+        hunted.append("first")
+        return 3, []
+
+    def second() -> tuple[int, list[str]]:
+        if stop[0]:
+            raise KeyboardInterrupt
+        hunted.append("second")
+        raise ValueError("broken")
+
+    monkeypatch.setattr(whole, "parts", lambda scale, home: {"first": first, "second": second})
+    monkeypatch.setattr("sys.argv", ["hunt", "--scale", "2", "--rows", str(tmp_path / "rows.md"), "--resume"])
+    with pytest.raises(KeyboardInterrupt):
+        whole.main()
+    assert [row.hunted for row in rows.read(tmp_path / "rows.md")] == ["first"]
+    stop[0] = False
+    assert whole.main() == 1  # a part that breaks has found that
+    assert hunted == ["first", "second"]
+    assert [(row.hunted, row.tried, row.found) for row in rows.read(tmp_path / "rows.md")] == [
+        ("first", 3, 0),
+        ("second", 1, 1),
+    ]
