@@ -12,6 +12,7 @@ from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit, progress
 from lie_codegen.cli.steering import steer
 from lie_codegen.errors import ComputationError, InputError, write_refusal
+from lie_codegen.whole_files import whole_file
 
 _Optional = typer.Option
 _MOST_SAMPLES = 10_000_000
@@ -63,7 +64,10 @@ def _write_csv(path: Path, t: Any, X: Any) -> None:
     if np.iscomplexobj(flat):
         flat = flat.view(float)
     try:
-        np.savetxt(path, np.column_stack([t, flat]), delimiter=",", header="t, entries of X row by row", fmt="%.17g")
+        with whole_file(path) as fresh:
+            np.savetxt(
+                fresh, np.column_stack([t, flat]), delimiter=",", header="t, entries of X row by row", fmt="%.17g"
+            )
     except OSError as error:
         raise write_refusal(f"{path} cannot be written", error) from None
 

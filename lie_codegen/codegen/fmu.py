@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
+import io
 import os
 import sys
 import sysconfig
@@ -18,6 +18,7 @@ from lie_codegen.codegen.target_functions import (
     PortView,
     c_sources,
     functions_of,
+    put_files,
     run_compiler,
 )
 from lie_codegen.codegen.templates import render
@@ -112,51 +113,47 @@ def _variable(
     }  # fmt: skip
 
 
-def pack_fmu(folder: Path, compilers: Sequence[Sequence[str]]) -> Path:
-    """Compile the unit for this machine and pack <namespace>.fmu in the folder: description, sources, and the library where there
-    is a compiler. Returns its path, which the manifest lists.
+def packed_fmu(tree: Mapping[str, str], namespace: str, compilers: Sequence[Sequence[str]]) -> bytes:
+    """The unit <namespace>.fmu of a package with the files of `fmu_files`: description, sources, and the library for this machine where
+    there is a compiler.
 
     Raises:
         CompileError: the compiler's own words.
     """
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    namespace = manifest["namespace"]
-    path = folder / f"{namespace}.fmu"
-    with tempfile.TemporaryDirectory() as name, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+    file = io.BytesIO()
+    sources = {Path(path).name: tree[path] for path in ("fmu/fmi3.c", *c_sources(tree))}
+    headers = {Path(path).name: tree[path] for path in sorted(tree) if path.startswith("include/")}
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
 
-        def add(place: str, content: bytes) -> None:
+        def add(place: str, content: str | bytes) -> None:
             # a fixed date: the same package is the same file
             packed.writestr(zipfile.ZipInfo(place, (1980, 1, 1, 0, 0, 0)), content)
 
-        add("modelDescription.xml", (folder / "fmu" / "modelDescription.xml").read_bytes())
-        add("sources/buildDescription.xml", (folder / "fmu" / "buildDescription.xml").read_bytes())
-        sources = [folder / "fmu" / "fmi3.c", *sorted((folder / "src").glob("*.c"))]
-        for source in sources:
-            add(f"sources/{source.name}", source.read_bytes())
-        for header in sorted((folder / "include").glob("*.h")):
-            add(f"sources/include/{header.name}", header.read_bytes())
+        add("modelDescription.xml", tree["fmu/modelDescription.xml"])
+        add("sources/buildDescription.xml", tree["fmu/buildDescription.xml"])
+        for name, text in sources.items():
+            add(f"sources/{name}", text)
+        for name, text in headers.items():
+            add(f"sources/include/{name}", text)
         if compilers:
             place, ending = _platform()
-            library = Path(name) / f"{namespace}{ending}"
-            maths = [] if os.name == "nt" else ["-lm"]
-            run_compiler(
-                [
-                    *compilers[0],
-                    "-O2",
-                    "-std=c99",
-                    "-shared",
-                    "-fPIC",
-                    f"-I{folder / 'include'}",
-                    *map(str, sources),
-                    "-o",
-                    str(library),
-                    *maths,
-                ]
-            )
-            add(f"binaries/{place}/{library.name}", library.read_bytes())
-    manifest["files"][path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
-    (folder / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
-    return path
+            add(f"binaries/{place}/{namespace}{ending}", _library(sources, headers, compilers[0]))
+    return file.getvalue()
+
+
+def _library(sources: Mapping[str, str], headers: Mapping[str, str], compiler: Sequence[str]) -> bytes:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        put_files(folder, {**sources, **{f"include/{each}": text for each, text in headers.items()}})
+        library = folder / "library"
+        maths = [] if os.name == "nt" else ["-lm"]
+        run_compiler(
+            [
+                *compiler, "-O2", "-std=c99", "-shared", "-fPIC", f"-I{folder / 'include'}",
+                *(str(folder / each) for each in sources), "-o", str(library), *maths,
+            ]
+        )  # fmt: skip
+        return library.read_bytes()
 
 
 def _platform() -> tuple[str, str]:

@@ -24,6 +24,7 @@ def generate(
     target: str = "c",
     starts: Mapping[str, Mapping[str, tuple[float, ...]]] | None = None,
     schedule: Mapping[str, str | int | float] | None = None,
+    compilers: Sequence[Sequence[str]] = (),
 ) -> Path:
     """Write the C package of `kernels` as a folder, in place of an earlier one; return its path.
 
@@ -37,6 +38,7 @@ def generate(
         target: what surrounds the C, see `lie_codegen.codegen.targets`.
         starts: {symbol: {port: numbers}} at which a unit of such a function starts; its first test vector where none is given.
         schedule: in what order a unit calls the functions of a closed loop, as in `PackageParts`.
+        compilers: commands, best first, for targets that hold a library.
 
     Raises:
         CodegenError: a kernel cannot become C, two symbols collide, or a constant is beyond the range of float.
@@ -44,7 +46,7 @@ def generate(
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
     tree = render_package(namespace, kernels, _metadata(metadata), extra, real, starts, schedule)
-    return write_package(with_target(tree, target, real), folder)
+    return write_package(with_target(tree, target, real, compilers), folder)
 
 
 def _metadata(given: PackageMetadata | Mapping[str, Any] | None) -> PackageMetadata:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from lie_codegen.codegen.fmu import fmu_files
+from lie_codegen.codegen.fmu import fmu_files, packed_fmu
 from lie_codegen.codegen.target_functions import (
     FunctionView,
     PortView,
@@ -45,8 +45,20 @@ def check_target(target: str, real: str) -> None:
         )
 
 
-def with_target(tree: Mapping[str, str], target: str, real: str) -> dict[str, str]:
-    """The package with the files of a target; the manifest lists them."""
+def with_target(
+    tree: Mapping[str, str], target: str, real: str, compilers: Sequence[Sequence[str]] = ()
+) -> dict[str, str | bytes]:
+    """The package with the files of a target, all that are to be written; the manifest lists them.
+
+    Args:
+        tree: the package as C.
+        target: one of `TARGETS`.
+        real: type of its numbers.
+        compilers: commands, best first, of which a unit of FMI takes its library for this machine; it has its sources alone without one.
+
+    Raises:
+        CompileError: the compiler's own words.
+    """
     if target == "c":
         return dict(tree)
     manifest = json.loads(tree["manifest.json"])
@@ -54,7 +66,12 @@ def with_target(tree: Mapping[str, str], target: str, real: str) -> dict[str, st
     whole = {**{path: text for path, text in tree.items() if path != "manifest.json"}, **added}
     manifest["target"] = target
     manifest["files"] = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in sorted(whole.items())}
-    return {**whole, "manifest.json": json.dumps(manifest, indent=2) + "\n"}
+    packed: dict[str, str | bytes] = {}
+    if target == "fmu":
+        unit = f"{manifest['namespace']}.fmu"
+        packed[unit] = content = packed_fmu(whole, manifest["namespace"], compilers)
+        manifest["files"][unit] = hashlib.sha256(content).hexdigest()
+    return {**whole, **packed, "manifest.json": json.dumps(manifest, indent=2) + "\n"}
 
 
 def _rust(manifest: Mapping[str, Any], tree: Mapping[str, str], real: str) -> dict[str, str]:

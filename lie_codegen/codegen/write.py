@@ -17,8 +17,8 @@ GENERATOR = "lie_codegen"
 _MANIFEST = "manifest.json"
 
 
-def write_package(tree: Mapping[str, str], folder: str | Path) -> Path:
-    """Write {path: text} as `folder`, replacing an earlier generated package there; return its path.
+def write_package(tree: Mapping[str, str | bytes], folder: str | Path) -> Path:
+    """Write {path: content} as `folder`, replacing an earlier generated package there; return its path.
 
     The tree is written to a temporary folder beside it, then renamed.
 
@@ -41,8 +41,9 @@ def write_package(tree: Mapping[str, str], folder: str | Path) -> Path:
         _write_tree(tree, fresh)
         _swap(fresh, target, replaced)
     except OSError as error:
-        _remove(fresh, tree)
         raise write_refusal(f"cannot write {folder}", error) from error
+    finally:
+        _remove(fresh, tuple(tree))  # where it was not moved to its place
     return target
 
 
@@ -91,14 +92,14 @@ def _some(paths: list[str]) -> str:
     return ", ".join(paths[:5]) + (f" and {len(paths) - 5} more" if len(paths) > 5 else "")
 
 
-def _write_tree(tree: Mapping[str, str], folder: Path) -> None:
+def _write_tree(tree: Mapping[str, str | bytes], folder: Path) -> None:
     mask = os.umask(0)  # the only way to read it
     os.umask(mask)
     folder.chmod(0o777 & ~mask)  # mkdtemp made it private
-    for path, text in tree.items():
+    for path, content in tree.items():
         file = folder / path
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(text.encode())
+        file.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def _swap(fresh: Path, target: Path, replaced: tuple[str, ...]) -> None:
@@ -107,19 +108,21 @@ def _swap(fresh: Path, target: Path, replaced: tuple[str, ...]) -> None:
         fresh.rename(target)
         return
     shelter = Path(tempfile.mkdtemp(prefix=f".{target.name}.old.", dir=target.parent))
-    old = target.rename(shelter / target.name)
+    old = shelter / target.name
     try:
-        fresh.rename(target)
-    except OSError:
-        old.rename(target)
-        shelter.rmdir()
-        raise
-    _remove(old, replaced)
-    with contextlib.suppress(OSError):
-        shelter.rmdir()
+        target.rename(old)
+        try:
+            fresh.rename(target)
+        except BaseException:
+            old.rename(target)
+            raise
+        _remove(old, replaced)
+    finally:
+        with contextlib.suppress(OSError):
+            shelter.rmdir()
 
 
-def _remove(folder: Path, files: Mapping[str, str] | tuple[str, ...]) -> None:
+def _remove(folder: Path, files: tuple[str, ...]) -> None:
     """Remove these files and the folders they leave empty; whatever else is there stays."""
     with contextlib.suppress(OSError):
         for path in files:

@@ -64,7 +64,6 @@ def generate(
         UncontrollableError: the controls of `steering` do not reach everything; says what is missing.
         OutputFolderError: the folder cannot be written, or holds files that are not ours.
     """
-    from lie_codegen.codegen.fmu import pack_fmu
     from lie_codegen.codegen.generate import generate as generate_package
     from lie_codegen.codegen.targets import check_target
     from lie_codegen.codegen.write import write_package
@@ -114,9 +113,8 @@ def generate(
         target=target,
         starts=starts,
         schedule=schedules[0] if len(schedules) == 1 else None,
+        compilers=[each.command for each in find_compilers()] if target == "fmu" else (),
     )
-    if target == "fmu":
-        pack_fmu(written, [each.command for each in find_compilers()])
     remember_package(key, written)
     return written
 

@@ -183,7 +183,7 @@ class MatrixGroup:
         description, which is of no account in comparisons, is not in it.
 
         Raises:
-            OutputFolderError, SystemRefusalError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
         """
         from lie_codegen.kernel.saved import save_definition
 

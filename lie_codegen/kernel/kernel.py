@@ -161,7 +161,7 @@ class Kernel:
 
         Raises:
             InputError: it was written by hand or by a factory of the user's; those pickle.
-            OutputFolderError, SystemRefusalError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
         """
         from lie_codegen.kernel.saved import save_definition  # what reads and writes files is imported by whoever saves
 

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, write_refusal
+from lie_codegen.errors import InputError
 from lie_codegen.kernel.records import check_kinds, complete, decoded, encoded
 from lie_codegen.values import Value
+from lie_codegen.whole_files import write_whole
 
 FORMAT, VERSION = "lie_codegen value", 1
 
@@ -31,7 +32,7 @@ class Saved(Value):
 
         Raises:
             InputError: it holds something that is no data, as a function written by the user; names it.
-            OutputFolderError, SystemRefusalError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
         """
         return _write(self, path)
 
@@ -41,7 +42,7 @@ def save_definition(thing: Any, path: str | Path, what: str) -> Path:
 
     Raises:
         InputError: it has no definition, or one that names a factory of the user's, which `load` would not call.
-        OutputFolderError, SystemRefusalError: the file cannot be written.
+        OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
     """
     if thing.definition is None:
         raise InputError(
@@ -60,22 +61,7 @@ def _write(value: Any, path: str | Path) -> Path:
     header = json.dumps({"format": FORMAT, "version": VERSION, "value": record}, sort_keys=True)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, header=np.frombuffer(header.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
-    return write_file(path, buffer.getvalue())
-
-
-def write_file(path: str | Path, content: bytes | str) -> Path:
-    """Write a file, a text in UTF-8; returns its path.
-
-    Raises:
-        OutputFolderError: no such folder, or a place where nothing may be written.
-        SystemRefusalError: the system is out of something, as of space.
-    """
-    target = Path(path)
-    try:
-        target.write_bytes(content.encode() if isinstance(content, str) else content)
-    except OSError as error:
-        raise write_refusal(f"{target} cannot be written", error) from None
-    return target
+    return write_whole(path, buffer.getvalue())
 
 
 def load(path: str | Path) -> Any:

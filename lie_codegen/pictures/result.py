@@ -11,6 +11,7 @@ from typing import Any
 from lie_codegen.errors import InputError, MissingDependencyError, write_refusal
 from lie_codegen.pictures.dark import dark
 from lie_codegen.pictures.style import style
+from lie_codegen.whole_files import whole_file, write_whole
 
 #: How a figure is drawn: on white, or on the dark page.
 THEMES = ("light", "dark")
@@ -72,7 +73,8 @@ def write_figure(figure: Any, path: Path) -> Path:
     """The figure in the format of the path's ending."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=150, metadata=FORMATS[path.suffix[1:].lower()])
+        with whole_file(path) as fresh:
+            figure.savefig(fresh, dpi=150, metadata=FORMATS[path.suffix[1:].lower()])
     except OSError as error:
         raise write_refusal(f"{path}: cannot be written", error) from None
     return path
@@ -85,10 +87,7 @@ def save(name: str, folder: Path, figure: Any, numbers: Mapping[str, Any]) -> Ga
         OutputFolderError: the folder cannot be written.
     """
     picture = write_figure(figure, folder / f"{name}.png")
-    try:
-        (folder / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise write_refusal(f"{folder}: cannot be written", error) from None
+    write_whole(folder / f"{name}.json", json.dumps(numbers, indent=2) + "\n")
     return GalleryResult(name, picture, numbers, figure)
 
 

@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, OutputFolderError, write_refusal
 from lie_codegen.pictures.result import new_figure
 from lie_codegen.pictures.steering_loops import COLOURS, GREY
+from lie_codegen.whole_files import whole_file
 
 _BAND = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MOST_PANELS = 12
@@ -61,7 +62,8 @@ def draw_study(
     if path is None:
         return figure
     try:
-        figure.savefig(path, dpi=150)
+        with whole_file(path) as fresh:
+            figure.savefig(fresh, dpi=150)
     except ValueError as error:  # a format that matplotlib does not know
         raise OutputFolderError(f"{path}: cannot be written: {error}") from None
     except OSError as error:

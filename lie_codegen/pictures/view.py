@@ -22,6 +22,7 @@ from lie_codegen.pictures.gltf import gltf_faces
 from lie_codegen.pictures.scene import Curves, Scene, distance_curve, motion_of, scene_data
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.plan import Plan
+from lie_codegen.whole_files import write_whole
 
 _SAMPLES = 401
 _MOST = 100_000
@@ -65,10 +66,9 @@ def view(
     page = page_text(what, group=group, body=body, obstacles=obstacles, title=title, samples=samples, solve=solve)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(page, encoding="utf-8")
     except OSError as error:
         raise write_refusal(f"{target}: cannot be written", error) from None
-    return target
+    return write_whole(target, page)
 
 
 def page_text(

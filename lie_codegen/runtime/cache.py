@@ -29,6 +29,7 @@ from lie_codegen.codegen.signature import Signature
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import CacheWarning
 from lie_codegen.runtime.compiler import compile_seconds
+from lie_codegen.whole_files import private_file
 
 #: The form of every key.
 DIGEST = re.compile(r"[0-9a-f]{64}")
@@ -192,17 +193,9 @@ def write_json(path: Path, data: Any) -> None:
         OSError: it cannot be written; the old file is untouched.
     """
     path.parent.mkdir(mode=0o700, exist_ok=True)
-    import tempfile
-
     text = json.dumps(data)
-    descriptor, name = tempfile.mkstemp(prefix=".new-", dir=path.parent)
-    try:
-        with open(descriptor, "w", encoding="utf-8") as file:
-            file.write(f"{_head(path, text)}{text}}}")
-        os.replace(name, path)
-    except OSError:
-        unlink(Path(name))
-        raise
+    with private_file(path) as fresh:
+        fresh.write_text(f"{_head(path, text)}{text}}}", encoding="utf-8")
 
 
 def read_json(path: Path) -> Any:

@@ -13,6 +13,7 @@ from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.runtime.degraded import CALLS, reason_of
 from lie_codegen.runtime.extension import has_headers, is_wanted
+from lie_codegen.whole_files import BEGUN
 
 _DEFAULT_LIMIT = 1 << 30
 _STALE_SECONDS = 3_600.0
@@ -164,7 +165,7 @@ def _size(entry: Path) -> int:
 
 def _remove_entry(entry: Path) -> None:
     unlink(entry / "entry.json")  # first: without it the rest is never loaded
-    for file in (*entry.glob("*-????????????????????????????????.*"), *entry.glob(".new-*"), entry / "sources.json"):
+    for file in (*entry.glob("*-????????????????????????????????.*"), *entry.glob(f"{BEGUN}*"), entry / "sources.json"):
         unlink(file)
     with contextlib.suppress(OSError):
         entry.rmdir()

@@ -324,7 +324,7 @@ class Compiled(Generic[Result]):
 
         Raises:
             InputError: its library has no definition.
-            OutputFolderError, SystemRefusalError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
         """
         from lie_codegen.kernel.saved import save_definition
 

@@ -97,7 +97,7 @@ class Library:
 
         Raises:
             InputError: it has no definition.
-            OutputFolderError, SystemRefusalError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
         """
         from lie_codegen.kernel.saved import save_definition
 

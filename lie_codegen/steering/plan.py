@@ -18,8 +18,9 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.kernel.saved import Saved, json_value, table_text, write_file
+from lie_codegen.kernel.saved import Saved, json_value, table_text
 from lie_codegen.values import Value, settle
+from lie_codegen.whole_files import write_whole
 
 #: What writes a plan as C stands above this file, and is loaded when it is asked for.
 PACKAGE = "lie_codegen.steering.plan_package"
@@ -310,7 +311,7 @@ class Plan(Saved):
         values = self.u(times)
         text = table_text({"t": times, **{f"u_{label}": values[:, i] for i, label in enumerate(self.group.labels)}})
         if path is not None:
-            write_file(path, text)
+            write_whole(path, text)
         return text
 
     def to_json(self, path: str | Path | None = None) -> str:
@@ -344,7 +345,7 @@ class Plan(Saved):
         }
         text = json.dumps(json_value(record), indent=1)
         if path is not None:
-            write_file(path, text)
+            write_whole(path, text)
         return text
 
     def package_parts(self, name: str | None = None, real: str = "double", form: str | None = None) -> PackageParts:

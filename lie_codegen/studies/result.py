@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,12 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.door import guard_methods
-from lie_codegen.errors import ComputationError, InputError
+from lie_codegen.errors import ComputationError, InputError, write_refusal
 from lie_codegen.studies.driver import Job
 from lie_codegen.studies.store import DONE, FAILED, Store
 from lie_codegen.studies.tasks import SampleStatus
 from lie_codegen.studies.work import Work
+from lie_codegen.whole_files import whole_file
 
 _READ = 200_000
 
@@ -250,24 +252,31 @@ class Study:
 
         Raises:
             ComputationError: pyarrow is not installed.
-            SystemRefusalError: the file cannot be written.
+            OutputFolderError, SystemRefusalError: the file cannot be written; what was there is untouched.
         """
-        try:
-            import pyarrow
-            from pyarrow import parquet
-        except ImportError:
-            raise ComputationError("parquet needs pyarrow: install it beside lie_codegen[study]") from None
+        if importlib.util.find_spec("pyarrow") is None:
+            raise ComputationError("parquet needs pyarrow: install it beside lie_codegen[study]")
         target = Path(path)
+        try:
+            with whole_file(target) as fresh:
+                self._write_parquet(fresh)
+        except OSError as error:
+            raise write_refusal(f"{target} cannot be written", error) from error
+        return target
+
+    def _write_parquet(self, path: Path) -> None:
+        import pyarrow
+        from pyarrow import parquet
+
         writer = None
         try:
             for first in range(0, self.n, _READ):
                 table = pyarrow.table(self._flat(first, min(_READ, self.n - first)))
-                writer = writer or parquet.ParquetWriter(target, table.schema)
+                writer = writer or parquet.ParquetWriter(path, table.schema)
                 writer.write_table(table)
         finally:
             if writer is not None:
                 writer.close()
-        return target
 
     def _flat(self, first: int, count: int) -> dict[str, Array]:
         found: dict[str, Array] = {"sample": np.arange(first, first + count)}

@@ -21,11 +21,14 @@ from tests.hunt import (
     generated_c,
     growth,
     hostile,
+    kills,
     methods,
     off_manifold,
+    resumed,
     rows,
     solver_arguments,
     texts,
+    torn,
     warnings_matrix,
 )
 
@@ -59,8 +62,13 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
         for kind in fuzz.TEXTS:
             found[f"{kind} that atheris makes"] = lambda kind=kind: fuzz.hunt_texts(kind, 10 * scale)
     found["faults injected: n-th write, rename, fork, lock refused, full or killed"] = lambda: faults.hunt(12 * scale)
-    found["kills among eight processes on one cache with tiny limits"] = lambda: faults.kills(20 * scale)
-    found["kills of processes that write a package and a plan"] = lambda: growth.torn_writes(20 * scale)
+    found["faults in writing files and packages: each call refused, full, or killed"] = lambda: torn.hunt(
+        most=2 * scale
+    )
+    found["faults in the store of a study that is gone on with"] = lambda: resumed.hunt(8 * scale)
+    found["kills among eight processes: one cache with tiny limits, files, packages, studies"] = lambda: kills.hunt(
+        20 * scale
+    )
     found["calls of six kinds without growth of memory"] = lambda: growth.calls(1_000_000 * scale)
     found["planted and tampered files of the cache"] = lambda: faults.planted(home / "planted")
     found["strict compilations: compilers, float, one lane, foreign targets"] = lambda: warnings_matrix.hunt(

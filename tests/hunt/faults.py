@@ -108,39 +108,6 @@ def hunt(count: int, seed: int = 0) -> tuple[int, list[str]]:
     return count, found
 
 
-def kills(count: int, processes: int = 8, seed: int = 0) -> tuple[int, list[str]]:
-    """(kills, finds): so many processes at once on one cache of a tiny limit, one after another killed at any moment."""
-    rng = random.Random(seed)
-    found: list[str] = []
-    killed = 0
-    with tempfile.TemporaryDirectory(prefix="hunt-") as home:
-        cache = Path(home) / "cache"
-        while killed < count:
-            code = WORK.replace('"hunted"', f'"hunted {rng.randrange(3)}"')
-            environment = _environment(cache, LIE_CODEGEN_CACHE_LIMIT=rng.choice(["1", "100000", "1000000000"]))
-            running = [
-                subprocess.Popen(
-                    [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-                )
-                for _ in range(processes)
-            ]
-            for each in running[: processes - 1]:
-                try:
-                    each.wait(rng.uniform(0.1, 1.5))
-                except subprocess.TimeoutExpired:
-                    each.kill()
-                    killed += 1
-            for each in running:
-                out, err = each.communicate(timeout=300)
-                if each.returncode not in (0, -9) or (
-                    each.returncode == 0 and not out.startswith(b"[1.0, 2.0, 3.0]; 54.0")
-                ):
-                    found.append(f"a survivor: status {each.returncode}, {out[-200:]!r}, {err[-300:]!r}")
-        after = healthy(cache)
-        found += [f"after {killed} kills: {after}"] if after else []
-    return killed, found
-
-
 def planted(folder: Path) -> tuple[int, list[str]]:
     """(tampered entries, finds): whatever is changed in an entry or a request, nothing of it is loaded, and numbers are right."""
     found: list[str] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -14,11 +15,14 @@ from tests.hunt import (
     generated_c,
     growth,
     hostile,
+    kills,
     methods,
     off_manifold,
+    resumed,
     rows,
     solver_arguments,
     texts,
+    torn,
     warnings_matrix,
 )
 
@@ -88,6 +92,13 @@ def test_after_a_fault_all_is_as_fast_as_ever() -> None:
     assert not found, "\n".join(found)
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="faults are injected into forks")
+def test_a_write_that_fails_leaves_the_old_or_the_new() -> None:
+    tried, found = torn.hunt(("group.npz", "tree"))
+    assert tried >= 30
+    assert not found, "\n".join(found)
+
+
 @pytest.mark.skipif(not warnings_matrix.compilers(), reason="neither gcc nor clang")
 def test_generated_c_has_no_warning_to_give(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(warnings_matrix, "has_zig", lambda: False)
@@ -107,7 +118,13 @@ def test_the_fuzzer_finds_nothing_and_keeps_what_it_needs(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_kills_and_planted_files(tmp_path: Path) -> None:
-    for tried, found in (faults.kills(40), faults.planted(tmp_path), faults.hunt(40), growth.torn_writes(20)):
+    for tried, found in (
+        kills.hunt(40),
+        faults.planted(tmp_path),
+        faults.hunt(40),
+        torn.hunt(most=8),
+        resumed.hunt(20),
+    ):
         assert tried
         assert not found, "\n".join(found)
 
