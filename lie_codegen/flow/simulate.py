@@ -68,8 +68,8 @@ def simulate(
 
     Args:
         group: the group; or a plan alone, as in `lc.simulate(plan)`.
-        u: a plan of `lc.steer`, which runs on its own system: with its drift, equation and start, torques with their inertia
-            (`run.xi`); else a PeriodicInput or a SampledInput (evaluated in the compiled loop where it is a Fourier series or straight
+        u: a plan of `lc.steer`, `lc.ocp` or momentum wheels, which runs on its own system: with its drift, equation and start, torques
+            with their inertia (`run.xi`), the problem's states and parameters; else a PeriodicInput or a SampledInput (evaluated in the compiled loop where it is a Fourier series or straight
             pieces, however long the run); a constant (n,); samples (len(t), n), joined by straight lines; a text for each
             component, a formula of t; or any u(t) -> (n,) (vectorised or not; an attribute `breakpoints` names the times at
             which it is not smooth), which is read once, finely enough to be known between the values (see `resolution`).

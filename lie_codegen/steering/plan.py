@@ -57,6 +57,24 @@ class Law(Protocol):
         """(k,) times -> (k, n)."""
 
 
+def inside(times: Array, duration: float | None) -> Array:
+    """The times at which the controls of a plan are known; what rounding put beyond the ends is at the ends. None is a duration without end.
+
+    Raises:
+        NotFiniteError, InputError: a time that is none, or outside [0, duration].
+    """
+    if not np.all(np.isfinite(times)):
+        raise NotFiniteError("u(t): a time is NaN or infinite")
+    if duration is None or not times.size:
+        return times
+    slack = _ROUNDING * duration
+    first, last = float(np.min(times)), float(np.max(times))
+    if first < -slack or last > duration + slack:
+        outside = first if first < -slack else last
+        raise InputError(f"u(t) is known on [0, {duration:g}]; t = {outside:g} is outside")
+    return np.clip(times, 0.0, duration)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Controls(Value):
     """u(t) on all n components (zeros where there is no control), for a float or an array of times.
@@ -82,20 +100,8 @@ class Controls(Value):
             InputError: a time is outside [0, duration].
         """
         times = np.asarray(t, dtype=float)
-        values = self.law(self._inside(np.atleast_1d(times)))
+        values = self.law(inside(np.atleast_1d(times), self.duration))
         return values[0] if times.ndim == 0 else values
-
-    def _inside(self, times: Array) -> Array:
-        if not np.all(np.isfinite(times)):
-            raise NotFiniteError("u(t): a time is NaN or infinite")
-        if self.duration is None or not times.size:
-            return times
-        slack = _ROUNDING * self.duration
-        first, last = float(np.min(times)), float(np.max(times))
-        if first < -slack or last > self.duration + slack:
-            outside = first if first < -slack else last
-            raise InputError(f"u(t) is known on [0, {self.duration:g}]; t = {outside:g} is outside")
-        return np.clip(times, 0.0, self.duration)
 
     def over(self, duration: float) -> Controls:
         """The same, known on [0, duration] alone."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,14 +12,14 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.attitude_metrics import second_kind_along
-from lie_codegen.flow.simulate import simulate
+from lie_codegen.flow.simulate import Simulated, simulate
 from lie_codegen.flow.simulate_arguments import check_times, check_tolerance, initial_elements
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.driven import Driven, simulate_driven
 from lie_codegen.steering.direct.inputs import Drive
 from lie_codegen.steering.direct.system import System
-from lie_codegen.steering.plan import Controls, Plan
+from lie_codegen.steering.plan import Controls, Plan, inside
 
 #: Times between the ends at which coordinates are followed, whatever times were asked for.
 _BETWEEN = 201
@@ -30,14 +31,14 @@ class Replay(Trajectory):
 
     Attributes:
         plan: what was flown.
-        xi: (k, n) body velocities under torques; None of a right-invariant system.
+        xi: (k, n) body velocities under torques; None of a right-invariant system, and of velocities that a user wrote.
     """
 
-    plan: Plan = field(kw_only=True, repr=False)
+    plan: Simulated = field(kw_only=True, repr=False)
     xi: Array | None = field(kw_only=True, repr=False)
 
     def _flow(self, times: Array, start: Array) -> Array:
-        return simulated(self.plan, t=times, X0=start, rtol=self.rtol).X[1:]
+        return self.plan.__simulate__(None, t=times, X0=start, rtol=self.rtol).X[1:]
 
     @property
     def g(self) -> Array:
@@ -105,32 +106,73 @@ def simulated(
     Raises:
         InputError: another group than the plan's, a time outside [0, duration], eps, or an option that its system does not know.
     """
-    group, where = plan.group if group is None else group, f"simulate({plan.group.name})"
-    if group != plan.group:
-        raise InputError(f"simulate: the plan is one of {plan.group.name}, not of {group.name}")
-    if np.ndim(eps) or eps != 1.0:
-        raise InputError(f"{where}: a plan is simulated as it is; scaled, it is the input plan.u.scaled(eps)")
-    times = check_times(group, np.linspace(0.0, plan.duration, 101) if t is None else t)
-    plan.u(times)  # refuses times outside
+    times = replay_times(plan, plan.group, group, t, eps)
     details = plan.details
     system = details.get("system")
     if details.get("inertia") is None and (system is None or not system.right):
-        velocity = velocity_of(plan)
-        start = _start(plan) if system is None else system.start
-        if X0 is None and times[0] > 0:
-            X0 = simulate(group, velocity, t=[0.0, times[0]], X0=start).X[-1]
-        return simulate(group, velocity, t=times, X0=start if X0 is None else X0, **options)
+        return along(
+            plan.group, velocity_of(plan), _start(plan) if system is None else system.start, times, X0, options
+        )
+    kind = "a right-invariant system" if details.get("inertia") is None else "torques"
+    rtol = replay_tolerance(f"simulate({plan.group.name})", options, kind)
+    return _replayed(plan, times, None if X0 is None else initial_elements(plan.group, X0), rtol)
+
+
+def replay_times(plan: Any, own: MatrixGroup, group: MatrixGroup | None, t: ArrayLike | None, eps: ArrayLike) -> Array:
+    """The times of a run of a plan, 101 from 0 to its duration if none are given.
+
+    Raises:
+        InputError: another group than the plan's own, a time outside [0, duration], eps.
+    """
+    if group is not None and group != own:
+        raise InputError(f"simulate: the plan is one of {own.name}, not of {group.name}")
+    if np.ndim(eps) or eps != 1.0:
+        raise InputError(
+            f"simulate({own.name}): a plan is simulated as it is; scaled, it is the input plan.u.scaled(eps)"
+        )
+    times = check_times(own, np.linspace(0.0, plan.duration, 101) if t is None else t)
+    return inside(times, plan.duration)
+
+
+def replay_tolerance(where: str, options: Mapping[str, Any], kind: str) -> float:
+    """rtol of a run that knows no other option.
+
+    Raises:
+        InputError: another option of `simulate` than a tolerance.
+    """
+    given = dict(options)
     tolerances = {
-        name: options.pop(name, default) for name, default in (("rtol", None), ("atol", 0.0), ("tolerance", None))
+        name: given.pop(name, default) for name, default in (("rtol", None), ("atol", 0.0), ("tolerance", None))
     }
     rtol = check_tolerance(where, **tolerances)
-    stray = [name for name, value in options.items() if value not in (None, (), [], 1, "auto")]
+    stray = [name for name, value in given.items() if value not in (None, (), [], 1, "auto")]
     if stray or tolerances["atol"]:
         raise InputError(
-            f"{where}: {', '.join(stray or ['atol'])} goes with body velocities; the plan is one of "
-            f"{'a right-invariant system' if details.get('inertia') is None else 'torques'}"
+            f"{where}: {', '.join(stray or ['atol'])} goes with body velocities; the plan is one of {kind}"
         )
-    return _replayed(plan, times, None if X0 is None else initial_elements(group, X0), rtol)
+    return rtol
+
+
+def starts_of(group: MatrixGroup, X0: ArrayLike | None) -> tuple[list[Array | None], Callable[[list[Array]], Array]]:
+    """The elements of N runs, None for where a plan is by itself, and what joins their results: (k, ...) each, (k, N, ...) of (N, d, d)."""
+    elements = None if X0 is None else initial_elements(group, X0)
+    if elements is None or elements.ndim == 2:
+        return [elements], lambda results: results[0]
+    return list(elements), lambda results: np.stack(results, axis=1)
+
+
+def along(
+    group: MatrixGroup,
+    velocity: Any,
+    start: Array | None,
+    times: Array,
+    X0: ArrayLike | None,
+    options: Mapping[str, Any],
+) -> Trajectory:
+    """The run of a body velocity that is known from t = 0, where X is `start`: from where it is at times[0], or from X0 there."""
+    if X0 is None and times[0] > 0:
+        X0 = simulate(group, velocity, t=[0.0, times[0]], X0=start).X[-1]
+    return simulate(group, velocity, t=times, X0=start if X0 is None else X0, **options)
 
 
 def _start(plan: Plan) -> Array | None:

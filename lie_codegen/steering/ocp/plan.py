@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.steering.ocp.problem_data import ProblemData
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
+
+#: What simulates a plan knows the solver, which stands above this file, and is loaded when it is asked for.
+FLIGHT = "lie_codegen.steering.ocp.flight"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,6 +85,10 @@ class OptimalPlan(Saved):
     def X_final(self) -> Array:
         """(d, d) where it ends."""
         return np.asarray(self.X[-1])
+
+    def __simulate__(self, group: MatrixGroup | None, **options: Any) -> Any:
+        """`lc.simulate` of this plan."""
+        return import_module(FLIGHT).simulated(self, group, **options)
 
     @property
     def group(self) -> Any:

@@ -22,6 +22,7 @@ QUADRATURES: dict[str, tuple[tuple[float, float], ...]] = {
 }
 #: Explicit tableaus in which each stage needs only the one before it.
 INTEGRATORS = {"rkmk4": CLASSICAL, "midpoint": MIDPOINT, "exact": EULER}
+ORDERS = {"rkmk4": 4, "midpoint": 2, "exact": 1}
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -13,8 +14,11 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError
+from lie_codegen.flow.trajectory import Trajectory
+from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.steering.plan import Plan, Status
+from lie_codegen.steering.plan_path import Replay, replay_times, replay_tolerance, simulated, starts_of
 from lie_codegen.steering.plan_table import PlanTable, plan_table
 from lie_codegen.steering.wheels.body import WheeledBody
 from lie_codegen.steering.wheels.motion import WheelRun, under_torques
@@ -84,6 +88,30 @@ class WheelPlan(Saved):
         if isinstance(self.plan, Plan):
             return self.plan.X(t)
         return self._flown(t).X if np.ndim(t) else self._flown(np.reshape(t, 1)).X[0]
+
+    def __simulate__(
+        self,
+        group: MatrixGroup | None,
+        *,
+        t: ArrayLike | None = None,
+        eps: ArrayLike = 1.0,
+        X0: ArrayLike | None = None,
+        **options: Any,
+    ) -> Trajectory:
+        """`lc.simulate` of this plan: of wheel speeds the body velocity that they make, of motor torques the body with its wheels."""
+        own = self.system.group
+        times = replay_times(self, own, group, t, eps)
+        if isinstance(self.plan, Plan):  # on the same matrices, in the basis of the wheels
+            return simulated(self.plan, t=times, X0=X0, **options)
+        rtol = replay_tolerance(f"simulate({own.name})", options, "torques")
+        starts, joined = starts_of(own, X0)
+        # turning the start is no symmetry: the momentum that is stored in space stays where it is
+        runs = [self._flown(times, start, rtol) for start in starts]
+        xi = joined([run.omega @ np.linalg.inv(self.system.frame).T for run in runs])
+        error, steps = max(run.error_estimate for run in runs), max(run.steps for run in runs)
+        return Replay(
+            own, times, joined([run.X for run in runs]), steps, error, "rkmk4", 0, 0.0, (), None, rtol, 0, plan=self, xi=xi,  # type: ignore[arg-type]
+        )  # fmt: skip
 
     @cached_property
     def X_final(self) -> Array:
@@ -158,16 +186,22 @@ class WheelPlan(Saved):
         rate = u @ self.system.frame.T
         return np.asarray(-(rate @ self.system.inertia.T) @ np.linalg.pinv(self.system.momenta).T)
 
-    def _flown(self, t: ArrayLike) -> WheelRun:
-        """The true body under the torques of the knots, at the times."""
+    def _flown(self, t: ArrayLike, X0: Array | None = None, tolerance: float = 1e-9) -> WheelRun:
+        """The true body under the torques of the knots, at the times; from X0 at the first of them, with the speeds that the plan has there."""
         knots = self.plan
         if isinstance(knots, Plan):
             raise InputError("a plan of lc.steer has speeds, no knots")
         times = np.asarray(t, dtype=float)
         if np.any(times < 0) or np.any(times > self.duration * (1 + 1e-9)):
             raise InputError(f"the plan is known on [0, {self.duration:g}]")
-        every, place = np.unique(np.append(np.minimum(times, knots.t[-1]), knots.t), return_inverse=True)
-        run = under_torques(self.system, knots.torque_at, every, self.start, knots.first, held=True)
+        begin, start, first = 0.0, self.start, knots.first
+        if X0 is not None:
+            begin, start = float(times[0]), X0
+            first = knots.first if begin == 0 else self._flown(times[:1]).speeds[0]
+        every, place = np.unique(
+            np.append(np.minimum(times, knots.t[-1]), knots.t[knots.t >= begin]), return_inverse=True
+        )
+        run = under_torques(self.system, knots.torque_at, every, start, first, tolerance, held=True)
         asked = place[: times.size]
         return replace(
             run,
