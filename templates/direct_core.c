@@ -191,7 +191,11 @@ static void add_identity(V *a)
     }
 }
 
-/* exp(a) and its derivatives along the b_i: Taylor's polynomial by Horner's rule, then squarings. Scales a and b. */
+/*
+ * exp(a) and its derivatives along the b_i: Taylor's polynomial by Horner's rule, then squarings. Scales a and b. The derivatives are
+ * those of the very operations: of E <- 1 + a E / j it is (a E' + b E) / j, of E <- E E it is E E' + E' E; so they belong to the
+ * E that is computed, to rounding, and Newton's steps on it converge. E' goes first, for it needs the E before.
+ */
 static void exponentials(V *a, V *b, const unsigned char *there, V *E, V *dE)
 {
     V square = spread(0.0), next[ENTRIES];
@@ -344,7 +348,7 @@ static void reduce(const task *w, const V *Y, point *at, V *Z)
     multiply(Y, right, 0, here);
     memcpy(value, w->value, sizeof value);
 #if PARTS == 2
-    if (p->free_phase) {
+    if (p->free_phase) { /* |Y R - e^(i phi) U| is least where e^(i phi) is the direction of <U, Y R>: U is turned there */
         V scale, c, s;
         for (e = 0; e < ENTRIES; e += 2) {
             overlap_r += value[e] * here[e] + value[e + 1] * here[e + 1];
@@ -411,10 +415,12 @@ static void reduce(const task *w, const V *Y, point *at, V *Z)
         }
         trace += G[i * (i + 1) / 2 + i];
     }
+    /* Motions that the goal leaves free change nothing: G is singular along them, and rounding may make it indefinite. */
     for (i = 0; i < N; ++i) {
         G[i * (i + 1) / 2 + i] += 1e-13 / N * trace + 1e-300;
     }
     factor(G, inverse);
+    /* Forward substitution with G's factor is Gram and Schmidt's process: rows before the i-th are orthonormal when it is reached. */
     for (i = 0; i < N; ++i) {
         V *row = Z + i * ENTRIES, sum = spread(0.0);
         for (j = 0; j < i; ++j) {
@@ -529,7 +535,11 @@ static void times(const task *w, const V *J, const V *x, V *F)
     }
 }
 
-/* The next controls of a damped step towards the goal; a control at a bound that pulls outwards stays there. */
+/*
+ * The next controls of a damped step towards the goal; a control at a bound that pulls outwards stays there. The step of Levenberg and
+ * Marquardt is -(J'J + mu)^-1 J'r = -J' (J J' + mu)^-1 r: the right side solves N equations, the left one as many as there are controls.
+ * A slot counts by its length, as in an integral over time: with M the lengths it is -M^-1 J' (J M^-1 J' + mu)^-1 r.
+ */
 static void damped_step(task *w, const point *at, V lambda, V *next)
 {
     const programme *p = w->p;
@@ -630,7 +640,7 @@ static void primal(task *w, const point *at, V rho, const V *y, const V *want, V
         const double per = 1.0 / p->mass[c / M];
         const V low = spread(p->low[c]), high = spread(p->high[c]);
         V value, rate;
-        if (p->fuel) {
+        if (p->fuel) { /* w |v| + rho/2 (v - s)^2 is least at s drawn towards zero by w / rho, and at zero where s is nearer than that */
             const V s = at->u[c] + per * inverse * w->z[c], t = p->weight[c] * inverse;
             value = SELECT(LESS(t, s), s - t, SELECT(LESS(s, -t), s + t, zero));
             rate = SELECT(LESS(t, s) | LESS(s, -t), inverse, zero);
@@ -638,6 +648,7 @@ static void primal(task *w, const point *at, V rho, const V *y, const V *want, V
             rate = 1.0 / (p->weight[c] + rho);
             value = (per * w->z[c] + rho * at->u[c]) * rate;
         }
+        /* dv/dy: none at a bound. There and at the corners of |v| the derivative is one of several, which semismooth Newton allows. */
         w->f[c] = SELECT(LESS(low, value) & LESS(value, high), per * rate, zero);
         v[c] = least(largest(value, low), high);
     }

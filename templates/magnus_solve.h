@@ -165,7 +165,7 @@ EXPORT ptrdiff_t magnus_solve(Solve *s)
         scale = sqrt(scale);
         s->estimate = sqrt(difference) / (pow((double)multiple / (double)before, trust) - 1.0);
         goal = larger(s->rtol * scale, s->atol);
-        lowest = 4e-16 * scale * sqrt((double)s->steps);
+        lowest = 4e-16 * scale * sqrt((double)s->steps); /* what rounding leaves after so many products, as a random walk */
         if (s->estimate <= larger(goal, lowest)) {
             s->longest = 0.0;
             s->shortest = INFINITY;

@@ -179,7 +179,7 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
         } else if (gap < 1.9 * h) {
             h = 0.5 * gap; /* not a step and a crumb */
         }
-        if (fresh) {
+        if (fresh) { /* the last slope of the step before is of no use: it was at Theta, and now X holds exp(Theta) and Theta is zero */
             rates(p, p->X, p->y, p->t, k);
             fresh = 0;
         }
@@ -188,12 +188,12 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
         if (!(error <= 1.0) || error < 0.0) {
             ++p->rejected;
             if (error < 0.0) {
-                p->h = 0.9 * h / -error;
+                p->h = 0.9 * h / -error; /* Theta grows about as h does: this length ends at 0.9 of its reach */
             } else {
                 const double factor = 0.9 * pow(error, -1.0 / 8);
                 p->h = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN */
             }
-            if (!(p->h > 1e-15 * fabs(p->t)) || p->h < 1e-300) {
+            if (!(p->h > 1e-15 * fabs(p->t)) || p->h < 1e-300) { /* t + h would be t */
                 return error <= 1e300 ? STUCK : LOST;
             }
             continue;
@@ -251,7 +251,11 @@ EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const d
     }
 }
 
-/* ---- Gauss collocation of order 6, equal steps: what is quadratic in y is kept to rounding, whatever the number of steps ---- */
+/*
+ * ---- Gauss collocation of order 6, equal steps: what is quadratic in y is kept to rounding, whatever the number of steps ----
+ * Its coefficients fulfil b_i a_ij + b_j a_ji = b_i b_j. For an invariant y'Qy, y'Q F(y) = 0 at every stage, and in the change of y'Qy over
+ * a step that is all there is: the sums of products of two stages cancel by that identity.
+ */
 
 enum { POINTS = 3, MOST_ROUNDS = 60 };
 static const double gauss_c[POINTS] = {0.1127016653792583115, 0.5, 0.8872983346207416885};
@@ -294,6 +298,7 @@ EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts)
             if (!(change <= 1e300)) {
                 return round ? STUCK : LOST; /* the iteration runs away */
             }
+            /* done; or as far as rounding lets it come: changes that no longer shrink, though they are small already */
             if (change <= 4e-16 * size || (change >= before && change <= 1e-13 * size)) {
                 break;
             }

@@ -31,6 +31,11 @@ static int pair_dense(Slope slope, const void *who, ptrdiff_t n, double t, const
             return 1;
         }
     }
+    /*
+     * In the form of pair_dense_at the slope at x = 0 is F_0 + F_1 and that at x = 1 is F_0 - F_1 - F_2: the first three terms are the
+     * cubic with the values and slopes of both ends. Every further term has the factor x^2 (1 - x)^2 and leaves these as they are,
+     * so that neighbouring steps fit together with their slopes, whatever the weights.
+     */
     for (i = 0; i < n; ++i) {
         const double change = after[i] - y[i];
         F[i] = change;

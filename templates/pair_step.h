@@ -59,8 +59,12 @@ static void pair_error_add(const double *k, ptrdiff_t n, ptrdiff_t at, double sc
     *three += e3 * e3 / (scale * scale);
 }
 
-/* The error of a step over what is allowed, from those sums over n entries: that of order 5, damped by that of order 3 (Hairer,
- * Norsett and Wanner, II.10). 0 where both vanish, NaN where a slope is. */
+/*
+ * The error of a step over what is allowed, from those sums over n entries: that of order 5, damped by that of order 3 (Hairer,
+ * Norsett and Wanner, II.10). 0 where both vanish, NaN where a slope is. With e5 of order h^5 and e3 of order h^3 the quotient
+ * h e5^2 / e3 is of order h^8, as the error of the step itself: so the next length goes by its eighth root. Where e3 happens to
+ * vanish e5 alone remains, which is larger, and safe.
+ */
 static double pair_error(double five, double three, double h, ptrdiff_t n)
 {
     const double down = five + 0.01 * three;

@@ -74,6 +74,7 @@ static void extrapolated_step(const V *inverse_weights, double h, V *y, double *
             }
         }
         memcpy(here, before, sizeof other);
+        /* With an even number of substeps the rule's error has even powers of the substep alone: each column takes the next one away. */
         for (column = row - 1; column >= 0; --column) {
             const double ratio = (double)(row + 1) / (column + 1);
             const double factor = 1.0 / (ratio * ratio - 1.0);
@@ -282,6 +283,7 @@ static void linearise(const problem *task, int steps, int *exact, slopes kind, p
         V coarse[N][N];
         tangent(task, MOST_NODES / 2, at->p, X, coarse);
         tangent(task, MOST_NODES, at->p, X, at->xi);
+        /* Steps of order four: of two runs the finer, with steps half as long, errs by a fifteenth of their difference. */
         for (a = 0; a < N; ++a) {
             for (k = 0; k < N; ++k) {
                 at->xi[a][k] += (1.0 / 15.0) * (at->xi[a][k] - coarse[a][k]);
@@ -301,12 +303,13 @@ static void linearise(const problem *task, int steps, int *exact, slopes kind, p
         any |= LANE(task->graded, k) > 0.0;
     }
     fill(&zero, 1, 0.0);
+    /* Z = q'G^-1 q is what a motion of the end along the group could take from E, to first order; the rest lies across the group. */
     damped_step(G, q, &zero, 0, at->z);
     at->Z = zero;
     for (k = 0; k < N; ++k) {
         at->Z -= q[k] * at->z[k];
     }
-    if (any) {
+    if (any) { /* F = sum row z^2; z is what is missing, so that it falls by xi dp where the end moves by that, to first order */
         mask = LESS(zero, task->graded);
         graded = zero;
         for (k = 0; k < N; ++k) {
@@ -637,6 +640,7 @@ static void area_rule(const problem *task, const V *x, int start, V (*u)[M])
             phase += SEED_STEPS / 8;
             stretch = 1.0 + 0.5 * uniform(&state);
         }
+        /* A circle of energy 4 pi |area| times its harmonic: the largest area goes round once, the next one twice ... */
         for (a = 0; a < PAIRS; ++a) {
             area[a] = 0.0;
             for (i = 0; i < N; ++i) {
@@ -650,6 +654,7 @@ static void area_rule(const problem *task, const V *x, int start, V (*u)[M])
         for (b = 0; b < PAIRS; ++b) {
             const double size_of = area[order[b]];
             const int harmonic = b + 1, one = first_of[order[b]], two = second_of[order[b]];
+            /* `harmonic` rounds of radius sqrt(area / (harmonic pi)); circles of unlike harmonics enclose no area with each other */
             const double w = 6.283185307179586 * harmonic;
             const double shape = sqrt(ease[one] / ease[two]);
             const double radius = stretch * sqrt(fabs(size_of) / (harmonic * 3.141592653589793)) * w;
@@ -919,7 +924,7 @@ static void search(problem *task, const steering_options *options, int first, in
     rule.most = options->search_iterations;
     rule.enough = size * options->search_tolerance;
     rule.near = SEARCH_RESIDUAL * size;
-    rule.wanted = LANES - LANES / 4;
+    rule.wanted = LANES - LANES / 4; /* the slowest quarter is not waited for */
     memset(at, 0, sizeof *at);
     for (; first < last || (list->count == 0 && first < 4 * last); first += LANES) {
         area_rule(task, x, first, u);

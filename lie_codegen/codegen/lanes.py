@@ -58,6 +58,7 @@ class LaneBlock:
 
     def with_twin(self, twin: LaneBlock) -> str:
         """As C, with the same for other samples."""
+        # the processor works on one while the other waits; a block is skipped where neither of the two vectors needs it
         both = [each for pair in zip(self.statements, twin.statements, strict=True) for each in pair]
         some = f"lcg_some((lcg_m)({self.condition} | {twin.condition}))"
         return self.beside(both, (*self.results, *twin.results), some)
@@ -220,6 +221,7 @@ class _Emitter:
             shift = self._names.shifts[port] if self._names.shifts else 0
             self._add("lcg_v", index, f"work[{entry}]" if port == self._work else f"in{port}[{shift + entry}]")
         elif op in ("SIN", "COS") and operands in self._paired:
+            # both of one argument share its reduction: one call gives the pair, whichever is asked for first
             if operands not in self._pairs:
                 name = self._pairs[operands] = f"{self._names.pair}{index}"
                 self.done.append(LaneStatement("lcg_pair", name, f"lcg_sincos({self.number(operands[0])})"))

@@ -123,6 +123,7 @@ def _ordered(tape: Tape, sides: list[Side | None], blocks: Mapping[Side, list[in
                 waits[node(index)].add(node(operand))
                 followers[node(operand)].add(node(index))
 
+    # Kahn's algorithm; of what is ready the earliest in the old order goes first, so that only what has to wait for a block moves.
     def place(each: int | Side) -> int:
         return each if isinstance(each, int) else blocks[each][-1]
 

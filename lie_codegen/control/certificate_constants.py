@@ -55,6 +55,7 @@ class Metric:
             z, x = rng.normal(size=(2, len(self.I)))
             value = 0.0
             for _ in range(200):
+                # the best of one vector, the others held, is the contraction itself: no turn makes the value smaller
                 y = np.einsum("ijk,i,j->k", T, z, x)
                 y /= max(1e-300, np.linalg.norm(y))
                 x = np.einsum("ijk,i,k->j", T, z, y)

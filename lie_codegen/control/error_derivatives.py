@@ -76,6 +76,7 @@ class ErrorDerivatives:
             nu, nu_dot = list(xi_d), list(xi_d_dot)
             return nu, nu_dot, [a + b for a, b in zip(nu_dot, bracket(self.ops, algebra, xi, nu), strict=True)]
         if self.error.transport == "right":
+            # nu = Ad_(X^-1 X_d) xi_d: X moves it by -[xi, nu]; X_d by Ad [xi_d, xi_d] = 0
             nu, turned = self.transported(xi_d), self.transported(xi_d_dot)
             return nu, minus(turned, bracket(self.ops, algebra, xi, nu)), turned
         X, Xi = self._moved(self.X, self.X_inverse, [self.group.hat(xi)])

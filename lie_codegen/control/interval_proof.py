@@ -51,6 +51,7 @@ def _product(x: Interval, y: Interval) -> Interval:
 
 
 def _square(x: Interval) -> Interval:
+    # not the product of x with itself, which takes its factors for two numbers: that of [-1, 1] is [-1, 1], the square [0, 1]
     small = np.where((x.low <= 0) & (x.high >= 0), 0.0, np.minimum(x.low**2, x.high**2))
     return _padded(small, np.maximum(x.low**2, x.high**2))
 
@@ -93,7 +94,7 @@ def _proved(
         margin, phi = claim(boxes)
         open_ = (margin.low < 0) & (phi.low <= level)
         if np.any(open_ & (margin.high < 0) & (phi.high <= level)):
-            return False
+            return False  # a whole box within the level breaks the claim
         boxes = _cut(boxes[open_], sides)
         counted += len(boxes)
         if counted > _MOST_BOXES:
@@ -140,6 +141,7 @@ class _Claim:
         whole = _sum([_square(c), _product(_square(s), _sum(squares))])
         margin = _sum([_times(self.sign * self.bound, _sum(Rw)), _times(-self.sign, _product(whole, energy))])
         top = _product(_square(s), energy)
+        # |q|^2 >= 1 on the faces of the cube or where c = 1, so that the quotient's ends are those of its parts, the other way round below
         phi = _padded(top.low / whole.high, top.high / whole.low)
         return margin, phi
 

@@ -113,6 +113,7 @@ class LevelSearch:
             middle = (low + high) / 2
             inside = self._phi(X_d, middle[:, None] * x) <= self.level
             low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        # a quarter on the level itself and an eighth next to the reference: there, at the ends of the rays, extreme values often are
         part = np.concatenate(
             [np.ones(count // 4), np.full(count // 8, 1e-2), rng.uniform(0, 1, count - count // 4 - count // 8)]
         )

@@ -37,6 +37,7 @@ def roots(f: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array) -> 
         k = left
         x = x1[k] + t[k] * (x2[k] - x1[k])
         value = f(x, k)
+        # x1 becomes the newest point, x2 stays beyond the root from it, and x3 is the one that this step left behind
         same = np.sign(value) == np.sign(f1[k])
         x3[k], f3[k] = np.where(same, x1[k], x2[k]), np.where(same, f1[k], f2[k])
         x2[k], f2[k] = np.where(same, x2[k], x1[k]), np.where(same, f2[k], f1[k])
@@ -48,10 +49,12 @@ def roots(f: Callable[[Array, NDArray[np.intp]], Array], a: Array, b: Array) -> 
         with np.errstate(all="ignore"):
             limit = tight / width
             xi, phi = (x1[k] - x2[k]) / (x3[k] - x2[k]), (f1[k] - f2[k]) / (f3[k] - f2[k])
+            # where this holds the inverse parabola through the three points is monotone between x1 and x2, and its value lies there
             safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
             quadratic = f1[k] / (f2[k] - f1[k]) * f3[k] / (f2[k] - f3[k]) + (x3[k] - x1[k]) / (x2[k] - x1[k]) * f1[
                 k
             ] / (f3[k] - f1[k]) * f2[k] / (f3[k] - f2[k])
+        # a step of at least the tolerance: a root that is nearer is passed by it, and then lies between x1 and x2 that close
         t[k] = np.clip(np.where(safe & np.isfinite(quadratic), quadratic, 0.5), limit, 1 - limit)
         left = k[on]
     return best

@@ -56,7 +56,7 @@ def reference_flow(
         fine = _one_period(group, u, eps, knots, parts)
         scale = max(1.0, float(np.max(np.abs(fine[-1]))))
         estimate = float(np.max(np.abs(fine[-1] - coarse[-1]))) / scale
-        if estimate <= _AGREEMENT * np.sqrt(parts):
+        if estimate <= _AGREEMENT * np.sqrt(parts):  # rounding adds up as a random walk does
             break
         if parts * len(knots) > _MOST_STEPS:
             raise ComputationError(

@@ -31,7 +31,9 @@ def resonances_met(model: TumblingBody, axes: BodyAxes, motion: Motion, rate: Fi
     for n1, n2 in _between(frequencies):
         value = frequencies @ (n1, n2)
         for i in np.flatnonzero(value[:-1] * value[1:] < 0):
-            part = value[i] / (value[i] - value[i + 1])
+            part = value[i] / (
+                value[i] - value[i + 1]
+            )  # the chord's zero: moments are so dense that the value is nearly straight
             when = float(moments[i] + part * (moments[i + 1] - moments[i]))
             found.append(Resonance(when, n1, n2, series_at(model, axes, cubic(when), when).harmonic(n1, n2)))
     return tuple(sorted(found, key=lambda each: each.t))

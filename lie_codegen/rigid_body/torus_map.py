@@ -40,6 +40,7 @@ class TorusSeries:
     def correction(self, phi: float, alpha: float) -> Array:
         """W (4,) at a point, osculating = mean + W."""
         divisor, small = _divisors(self.rate, self.m)
+        # a wave is integrated by its frequency; the outermost, NODES/2, stands for both of its signs, which have two, and is left out
         kept = ~small & (np.abs(_N1) < NODES / 2) & (np.abs(_N2) < NODES / 2)
         factor = np.zeros_like(divisor, dtype=complex)
         factor[kept] = np.exp(1j * (2 * np.pi * _N1 * phi + _N2 * alpha))[kept] / (1j * divisor[kept])

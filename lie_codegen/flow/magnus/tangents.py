@@ -16,6 +16,7 @@ from lie_codegen.signals.parametric_input import ParametricInput
 
 #: Gauss-Legendre: the moments of two waves' worth of h^11 beyond the order of the steps.
 NODES, _WEIGHTS = (each / 2 for each in np.polynomial.legendre.leggauss(6))
+#: From the values of u at the nodes the cubic in s, from -1/2 to 1/2, with u's own first four moments; integrals of s^(i + j) are _GRAM.
 _GRAM = np.array([[(0 if (i + j) % 2 else 1 / ((i + j + 1) * 2.0 ** (i + j))) for j in range(4)] for i in range(4)])
 PROJECTION = np.ascontiguousarray(np.linalg.solve(_GRAM, np.array([_WEIGHTS * NODES**i for i in range(4)])))
 #: Values of u and of its derivatives that are held at once.
@@ -33,6 +34,7 @@ def tangents(
     X, dX = np.eye(group.degree, dtype=kind), np.zeros((m, group.degree, group.degree), kind)
     for a, b in pairwise(ends):
         count = max(1, int(np.ceil(steps * (b - a) / length * (1 - 1e-12))))
+        # no step straddles a breakpoint, where the order would be lost; blocks keep the values that are held at once within memory
         blocks = -(-count // most)
         for k in range(blocks):
             left, right = a + (b - a) * k / blocks, a + (b - a) * (k + 1) / blocks

@@ -201,6 +201,8 @@ def special2_log(ops: Arithmetic, a: Complex, b: Complex, c: Complex, d: Complex
     t, h = (a + d) * half, (a - d) * half
     square = h * h + b * c
     size = square.re * square.re + square.im * square.im
+    # X has the eigenvalues t + s and t - s, whose product is 1: mu = log(t + s) on one and -mu on the other, which (mu/s) (X - t) is on both.
+    # Near the identity mu = asinh(s), for cosh mu = t and sinh mu = s: its series needs no root, and no digits of t.
     series = Complex(ops.constant(_asinh(_ASINH_TERMS - 1)), 0)
     for k in range(_ASINH_TERMS - 2, -1, -1):
         series = series * square + Complex(ops.constant(_asinh(k)), 0)

@@ -74,6 +74,7 @@ def _forms(group: MatrixGroup, controls: tuple[int, ...], harmonics: int) -> tup
     AA = np.einsum("iab,jbc->ijac", A, A)
     AAA = np.einsum("ijab,kbc->ijkac", AA, A)
     D = len(controls) * size
+    # Z_2 and Z_3 lie in the algebra, single products do not; projecting is linear, so that it may be done product by product.
     quadratic = np.einsum("ijn,pq->nipjq", group.project(AA), second).reshape(-1, D, D)
     cubic = np.einsum("ijkn,pqr->nipjqkr", group.project(AAA), third).reshape(-1, D, D, D)
     linear = np.einsum("in,p->nip", np.eye(group.dim)[list(controls)], I1).reshape(-1, D)

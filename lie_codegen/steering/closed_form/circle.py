@@ -120,8 +120,11 @@ def circle_law(chord: Array, area: float) -> Array:
     def excess(theta: float) -> float:
         return float((theta - np.sin(theta)) * length**2 - 8 * size * np.sin(theta / 2) ** 2)
 
+    # Up to half a circle area / |chord|^2 lies between theta/12 and theta/8, beyond it is larger: a quarter of what theta/12 gives is
+    # below the root, and at the full circle, where the chord vanishes, `excess` is positive.
     shallow = 12 * size / length**2
     theta = float(scipy.optimize.brentq(excess, min(shallow, np.pi) / 4, 2 * np.pi, xtol=1e-15))
+    # towards the full circle the chord shrinks and no longer tells the radius; the area does
     radius = length / (2 * np.sin(theta / 2)) if theta < np.pi else np.sqrt(2 * size / (theta - np.sin(theta)))
     theta = float(np.copysign(theta, area))
     phi = np.arctan2(chord[1], chord[0]) - theta / 2

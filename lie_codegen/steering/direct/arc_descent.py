@@ -111,6 +111,7 @@ def tidied(
     """The word without empty arcs, full turns and repeated letters, brought to the goal again; the residual."""
     before, after = arcs.free_slots
     durations = arcs.own(u)[:, 0]
+    # exp(s V) of a letter that comes back after the time `limits` does not change when whole turns are left out
     turns = limits[word] < longest
     durations = np.where(turns, np.mod(durations, np.where(turns, limits[word], 1.0)), durations)
     durations = np.where(turns & (limits[word] - durations < _GONE), 0.0, durations)

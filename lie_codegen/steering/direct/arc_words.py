@@ -67,6 +67,7 @@ def longest_useful(task: Manoeuvre, velocities: Array, longest: float) -> Array:
     """(L,) longest useful duration of each letter: its period, where exp(s V) returns to the identity."""
     limits = np.full(len(velocities), float(longest))
     for number, V in enumerate(velocities):
+        # exp(s V) is the identity only where every eigenvalue's rate times s is a whole number of turns: for the slowest one, two, three ...
         rates = np.abs(np.linalg.eigvals(V).imag)
         rates = rates[rates > 1e-9]
         if len(rates):
@@ -92,7 +93,7 @@ def short_words(letters: int, arcs: int, starts: int, rng: np.random.Generator) 
 def long_words(letters: int, arcs: int, lanes: int, rng: np.random.Generator) -> Array:
     """(lanes, arcs) random words without the same letter twice in a row."""
     words = rng.integers(0, letters, (lanes, arcs))
-    for k in range(1, arcs if letters > 1 else 0):
+    for k in range(1, arcs if letters > 1 else 0):  # 1 .. letters - 1 further on: every other letter is as likely
         words[:, k] = (words[:, k - 1] + rng.integers(1, letters, lanes)) % letters
     return words
 

@@ -29,6 +29,7 @@ def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array,
     for k in range(K - 1, -1, -1):
         after[:, k] = tail
         tail = E[:, k] @ tail
+    # dX/du_k = E_1 .. E_k-1 (dE_k/du_k) E_k+1 .. E_K: with the products from both ends one matrix product a control
     moved = (goal.left @ before)[:, :, None] @ dE @ (after @ goal.right)[:, :, None]
     r, reduce = residual(p.basis, goal, X)
     rows = np.einsum("lnq,lkiq->lnki", reduce, flat(moved))
@@ -50,6 +51,7 @@ def residual(basis: Array, goal: Goal, X: Array) -> tuple[Array, Array]:
     slopes = (goal.left @ X)[:, None] @ basis @ goal.right
     value = goal.value
     if goal.free_phase:
+        # |X - e^(i phi) U| is least at the phase of <U, X>; as X moves that phase turns too, at `rate`, and so does what X is compared with
         overlap = np.sum(np.conj(value) * here, axis=(1, 2))
         turn = overlap / np.abs(overlap)
         value = turn[:, None, None] * value
@@ -58,6 +60,7 @@ def residual(basis: Array, goal: Goal, X: Array) -> tuple[Array, Array]:
     D = flat(slopes)
     gram = D @ np.swapaxes(D, 1, 2)
     n = gram.shape[1]
+    # motions that the goal leaves free change nothing: without the shift the factor would not exist
     gram = gram + (1e-13 * np.trace(gram, axis1=1, axis2=2) / n + 1e-300)[:, None, None] * np.eye(n)
     return flat(here - value), np.linalg.solve(np.linalg.cholesky(gram), D)
 

@@ -82,6 +82,7 @@ class Course:
         X[:, 0] = self.start
         for k in range(len(entry)):
             X[:, k + 1] = X[:, k] @ E[:, k]
+        # X_k+1 = X_k E_k moves by X_k dE_k = (X_k dE_k X_k+1^-1) X_k+1, and what follows from it by the same factor on the left
         back = np.linalg.inv(X[:, 1:])
         return X, X[:, :-1, None] @ dE @ back[:, :, None]
 

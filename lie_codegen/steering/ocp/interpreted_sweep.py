@@ -83,6 +83,7 @@ class InterpretedSweep(InterpretedMerit):
             kappa, free, solve = found
             K = np.zeros((m, nx))
             K[free] = -solve(Qux[free])
+            # For any feedback u + kappa + K dx: where a bound holds a control kappa is no Newton step, and the shorter forms for one do not hold.
             gain -= float(kappa @ (qu + Quu @ kappa / 2))
             v = q[:nx] + K.T @ (qu + Quu @ kappa) + Qux.T @ kappa
             P = Q[:nx, :nx] + Qux.T @ K + K.T @ Qux + K.T @ Quu @ K

@@ -62,6 +62,7 @@ class Extremal(Saved):
         h = 1.0 / self.nodes
         mu = self.costates[:-1][None]
         for order in range(_ORDER):
+            # mu' is quadratic in mu: what the power s^order of it is made of are the pairs of coefficients of powers p and order - p
             u = mu[..., list(self.controls)] / self.weights
             total = np.einsum("pti,ptk,ijk->tj", u, mu[::-1], self._ad, optimize=True)
             mu = np.concatenate([mu, (h / (order + 1)) * total[None]])
@@ -110,6 +111,7 @@ class Extremal(Saved):
         lengths = np.array(bracket_lengths(self.group, self.controls))
         speed = float(np.linalg.norm(self.mu0[list(self.controls)] / self.weights))
         r = np.minimum(1.0, max(speed, 1e-12) * np.arange(1, _STEPS + 1) / _STEPS)
+        # xi[k, c] says how a costate of size r^(2 - l_c) moves a direction of size r^l_k: divided by its natural size it is of order one
         scaled = self.sensitivities * r[:, None, None] ** (2.0 - lengths[:, None] - lengths)
         noise = np.maximum(_RESOLVED, _NOISE * r ** (2.0 - 2 * lengths.max()))
         return scaled, np.linalg.svd(scaled, compute_uv=False), noise
@@ -117,7 +119,8 @@ class Extremal(Saved):
     def conjugate_times(self) -> tuple[float, ...]:
         """Times in (0, 1) at which det xi changes sign: past the first one the extremal is no local minimum.
 
-        Times at which rounding alone could change the sign do not count.
+        Times at which rounding alone could change the sign do not count; nor do two conjugate points at one time, where det xi touches
+        zero without changing its sign.
         """
         scaled, sizes, noise = self._scaled
         known = np.flatnonzero(sizes[:, -1] > noise * sizes[:, 0])

@@ -82,6 +82,7 @@ def end_slope(extremal: Extremal) -> Array:
     """(n, n) d mu(1) / d mu(0): of the costate, and of the end at which it is read."""
     group, X = extremal.group, extremal.X[-1]
     carried = group.project(X @ group.basis @ np.linalg.inv(X))
+    # <mu(1), A> = <mu(0), Ad_X(1) A>: the first part is Ad_X(1)*; the second is what moving X(1) by xi does to Ad_X(1) A, a bracket with xi
     turning = np.einsum("ijk,k->ji", group.algebra.structure_constants, extremal.costates[-1])
     return np.asarray(carried + turning @ extremal.sensitivities[-1])
 

@@ -55,7 +55,7 @@ def oscillation_step(group: MatrixGroup, forces: int) -> Kernel:
             wave, beside = s, c
             twice_c, twice_s = c * c - s * s, 2 * s * c
             for i, (a, b) in enumerate(pairs):
-                if i:
+                if i:  # sin and cos of the next odd multiple: turned by twice the angle, with no sine of its own
                     wave, beside = wave * twice_c + beside * twice_s, beside * twice_c - wave * twice_s
                 p, q = balance[i] * z, -2 * parts[m + i] * z / balance[i]
                 for force, amplitude in ((a, p), (b, q)):
