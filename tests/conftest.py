@@ -68,14 +68,14 @@ def elsewhere() -> Iterator[Callable[[Any], list[Any]]]:
 @pytest.fixture
 def compiles(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The main files of the runs of the compiler."""
-    from lie_codegen.runtime import ladder  # not before the threads of BLAS are set
+    from lie_codegen.runtime import compiling  # not before the threads of BLAS are set
 
     runs: list[str] = []
-    real = ladder.compile_library
+    real = compiling.compile_library
 
     def counted(*args: Any) -> None:
         runs.append(args[2])
         real(*args)
 
-    monkeypatch.setattr(ladder, "compile_library", counted)
+    monkeypatch.setattr(compiling, "compile_library", counted)
     return runs

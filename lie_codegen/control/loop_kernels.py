@@ -30,7 +30,7 @@ def loop_step(loop: Loop, name: str = "loop_step") -> Kernel:
     plant, extent = loop.plant, loop.extent(sampled=False)
 
     def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *rest: Any) -> tuple[Any, ...]:
-        X, v = plant.opened(state)
+        X, v = plant.unpacked(state)
         own = loop.own(state)
         reference, numbers = loop.given(rest)
         stages = [loop.stage(reference, i) for i in range(3)] if reference else [{}] * 3
@@ -100,7 +100,7 @@ def loop_control(loop: Loop, name: str = "loop_control") -> Kernel:
 
     def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *rest: Any) -> tuple[Any, ...]:
         reference, numbers = loop.given(rest)
-        X, v = loop.plant.opened(state)
+        X, v = loop.plant.unpacked(state)
         return (controlled(ops, loop, state, X, v, t, h, reference, numbers),)
 
     return _kernel(loop, name, extent, loop.reference_ports(stages=1), body, "the law at a sample", noisy=True)
@@ -131,7 +131,7 @@ def loop_outputs(loop: Loop, name: str = "loop_outputs") -> Kernel:
 
     def body(ops: Arithmetic, state: Vector, t: Scalar, h: Scalar, *rest: Any) -> tuple[Any, ...]:
         reference, numbers = loop.given(rest)
-        X, v = loop.plant.opened(state)
+        X, v = loop.plant.unpacked(state)
         now = {**(loop.stage(reference, None) if reference else {}), "time": t, "period": h}
         values = called(ops, loop, X, v, loop.own(state), now, numbers)
         return *(values[port.name] for port in law.kernel.outputs), limited(ops, loop, values[COMMAND], numbers)
@@ -151,7 +151,7 @@ def moved(
 ) -> tuple[Any, Vector]:
     """Configuration and velocity after a step under the held command."""
     plant = loop.plant
-    X, v = plant.opened(state)
+    X, v = plant.unpacked(state)
     command = list(state[-plant.sizes[2] :])
 
     def rates(stage: int, time: Scalar, elements: list[Any], w: Vector) -> tuple[list[Vector], Vector]:

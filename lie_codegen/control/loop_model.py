@@ -227,7 +227,7 @@ class Loop:
     def sampled_port(self, rng: random.Random, port: Port) -> Any:
         """An admissible value of a reference or a number."""
         if port.name == "X_d":
-            X, _ = self.plant.opened(self.plant.sample(rng))
+            X, _ = self.plant.unpacked(self.plant.sample(rng))
             if port.shape == self.plant.ports[0].shape:
                 return X
             return [[x for row in X for x in row] if isinstance(X[0], list) else list(X) for _ in range(3)]

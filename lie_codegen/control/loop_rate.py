@@ -81,7 +81,7 @@ def loop_rate(loop: Loop, reference: Any = None, name: str = "loop_rate") -> Ker
             flat = [x for each in mine if each.kind == "vector" for x in _entries(changes[each.name])]
             return [*turned, *(changes[each.name] for each in mine if each.kind == "group")], [*slope, *flat]
 
-        return (product_rate(ops, moves, _opened(moves, X), y, rates, t),)
+        return (product_rate(ops, moves, _unpacked(moves, X), y, rates, t),)
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         state = loop.sample(rng, extent)
@@ -108,7 +108,7 @@ def loop_settle(loop: Loop, name: str = "loop_settle") -> Kernel:
 
     def body(ops: Arithmetic, X: Vector, theta: Vector) -> tuple[Any, ...]:
         after, place = [], 0
-        for move, element in zip(moves, _opened(moves, X), strict=True):
+        for move, element in zip(moves, _unpacked(moves, X), strict=True):
             after += pack(move.group, move(ops, element, list(theta[place : place + move.group.dim])))
             place += move.group.dim
         return (after,)
@@ -123,7 +123,7 @@ def loop_settle(loop: Loop, name: str = "loop_settle") -> Kernel:
     )  # fmt: skip
 
 
-def _opened(moves: Sequence[Move], X: Vector) -> list[Any]:
+def _unpacked(moves: Sequence[Move], X: Vector) -> list[Any]:
     elements, place = [], 0
     for move in moves:
         size = packed_size(move.group)

@@ -67,7 +67,7 @@ class Plant(Protocol):
     def numbers(self) -> tuple[Port, ...]:
         """Its numbers that are inputs."""
 
-    def opened(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
+    def unpacked(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
         """Configuration and velocity of the first entries of a state."""
 
     def closed(self, X: Any, v: Vector) -> Vector:
@@ -145,7 +145,7 @@ class GroupPlant:
         port = _inertia_port(self.group.dim)
         return port, Port("inertia_inverse", port.shape)
 
-    def opened(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
+    def unpacked(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
         size, speed, _ = self.sizes
         return unpack(self.group, flat[:size]), list(flat[size : size + speed])
 

@@ -78,7 +78,7 @@ class SpacePlant:
     def numbers(self) -> tuple[Port, ...]:
         return ()
 
-    def opened(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
+    def unpacked(self, flat: Sequence[Scalar]) -> tuple[Any, Vector]:
         return list(flat[: self.size]), list(flat[self.size : sum(self.sizes[:2])])
 
     def closed(self, X: Any, v: Vector) -> Vector:

@@ -16,9 +16,9 @@ from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_door import Attempt, compiled_entry, request_key
 from lie_codegen.runtime.cache_folder import note_not_loaded, usable_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, warn_no_compiler
+from lie_codegen.runtime.compiling import compile_entry
 from lie_codegen.runtime.digests import cpu_identity, digest
 from lie_codegen.runtime.extension import prepare_extension
-from lie_codegen.runtime.ladder import compile_entry
 from lie_codegen.runtime.lane_library import ONE_LANE, keep_sources
 from lie_codegen.runtime.library import Library, check_names
 from lie_codegen.runtime.patience import progress
@@ -195,6 +195,6 @@ def _open_or_none(entry: cache.Entry) -> Library | None:
 
 
 def _open(entry: cache.Entry) -> Library:
-    from lie_codegen.runtime.opened import open_entry  # numpy, which a cold build imports while compilers run
+    from lie_codegen.runtime.entry_library import open_entry  # numpy, which a cold build imports while compilers run
 
     return open_entry(entry)

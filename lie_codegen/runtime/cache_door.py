@@ -11,8 +11,8 @@ from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import temporary_folder
 from lie_codegen.runtime.cache_upkeep import evict
 from lie_codegen.runtime.compiler import Compiler
+from lie_codegen.runtime.compiling import first_that_works
 from lie_codegen.runtime.digests import cpu_identity, digest, package_digest, templates_digest, versions
-from lie_codegen.runtime.ladder import first_that_works
 
 
 def request_key(compiler: Compiler, flags: tuple[str, ...], **asked: Any) -> str:

@@ -17,9 +17,9 @@ from lie_codegen.errors import CompileError, CompilerStoppedError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import temporary_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers
+from lie_codegen.runtime.compiling import compile_entry
 from lie_codegen.runtime.degraded import BATCHES, warn_degraded
 from lie_codegen.runtime.digests import digest
-from lie_codegen.runtime.ladder import compile_entry
 
 #: What the first compilation defines: lanes of one sample.
 ONE_LANE = "-DLCG_LANES=1"

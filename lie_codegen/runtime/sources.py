@@ -11,7 +11,7 @@ from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.cache_door import compiled_entry, request_key
 from lie_codegen.runtime.cache_folder import note_not_loaded, usable_folder
 from lie_codegen.runtime.compiler import Compiler, find_compilers, warn_no_compiler
-from lie_codegen.runtime.ladder import compile_entry
+from lie_codegen.runtime.compiling import compile_entry
 
 #: Multiplications and additions may fuse here: an iterative solver has no bits to reproduce.
 SOLVER_FLAGS = ("-O2", "-march=native", "-std=c99", "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")

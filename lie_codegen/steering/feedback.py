@@ -23,10 +23,10 @@ from lie_codegen.flow.logarithm import distance
 from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.finish import energy
 from lie_codegen.steering.methods import OPEN_LOOP, plan_by, solver_of
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.seeds import area_rule_seed
+from lie_codegen.steering.simulated_plan import energy
 from lie_codegen.steering.task import Task
 from lie_codegen.values import Value
 

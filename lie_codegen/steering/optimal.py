@@ -12,11 +12,11 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.finish import flown_end
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.shooter import shooter
 from lie_codegen.steering.shooting.transversal import focal_times
+from lie_codegen.steering.simulated_plan import simulated_end
 from lie_codegen.steering.task import Task
 from lie_codegen.values import Value
 
@@ -84,7 +84,7 @@ class Shot(Value):
         }
         if self.free is not None:
             details["transversality"] = float(np.linalg.norm(self.free @ extremal.costates[-1])) / plan.duration
-        end = flown_end(plan.group, plan.u, plan.duration)
+        end = simulated_end(plan.group, plan.u, plan.duration)
         error = distance(plan.group, plan.target, end)
         seconds = {**self.seconds, "examine": examined - started, "simulate": time.perf_counter() - examined}
         return Facts(end, error, self._status(error, conjugate), details, seconds)

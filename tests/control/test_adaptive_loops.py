@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import ComputationError, InputError
-from lie_codegen.runtime import ladder
+from lie_codegen.runtime import compiling
 
 J = np.diag([1.0, 2.0, 3.0])
 TIMES = np.linspace(0, 10, 101)
@@ -110,7 +110,7 @@ def test_another_inertia_starts_no_compiler(monkeypatch: pytest.MonkeyPatch) -> 
     def refuse(*_: Any, **__: Any) -> None:
         raise AssertionError("a compiler was started")
 
-    monkeypatch.setattr(ladder, "compile_library", refuse)
+    monkeypatch.setattr(compiling, "compile_library", refuse)
     run = lc.closed_loop("so3", inertia=np.diag([2.0, 2.0, 5.0])[None], **given)
     assert run.steps < 200
 

@@ -24,7 +24,7 @@ from lie_codegen.groups.buildable import object_definition, source_definition
 from lie_codegen.groups.catalogue_names import definition_source, group_path
 from lie_codegen.groups.kernels import KERNEL_NAMES, group_kernel
 from lie_codegen.groups.prebuilt import find_prebuilt, prebuilt_folder
-from lie_codegen.runtime import cache, compiler, ladder
+from lie_codegen.runtime import cache, compiler, compiling
 from lie_codegen.runtime.compiler import find_compilers
 from lie_codegen.runtime.digests import digest
 
@@ -158,7 +158,7 @@ def test_a_failure_is_told_when_the_kernel_is_asked_for_and_is_not_kept(
 ) -> None:
     library = lc.build("so3")
     with monkeypatch.context() as patch:
-        patch.setattr(ladder, "compile_library", _full_disk)
+        patch.setattr(compiling, "compile_library", _full_disk)
         patch.setattr("lie_codegen.runtime.cache_door.temporary_folder", lambda reason: home)
         with pytest.raises(lc.errors.CacheError, match="No space left"):
             library.exp  # noqa: B018

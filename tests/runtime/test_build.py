@@ -23,7 +23,7 @@ import toy_kernels
 
 from lie_codegen.errors import CacheError, CacheWarning, CodegenError, CompileError, NoCompilerWarning
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.runtime import build, cache, cache_folder, compiler, opened
+from lie_codegen.runtime import build, cache, cache_folder, compiler, entry_library
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
@@ -256,7 +256,7 @@ def test_a_library_that_goes_between_check_and_load_is_built_again(
         return entry
 
     monkeypatch.setattr(cache, "find_request", evicted)
-    monkeypatch.setattr(opened, "load_library", load_copy)
+    monkeypatch.setattr(entry_library, "load_library", load_copy)
     assert build_kernels(lambda: [scaled(5)], definition="five").scale(2.0) == 10.0
     assert len(compiles) == 2
 

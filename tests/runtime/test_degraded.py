@@ -18,7 +18,7 @@ import pytest
 import toy_kernels
 
 from lie_codegen.errors import CacheError, CacheWarning, CompilerStoppedError, DegradedWarning
-from lie_codegen.runtime import cache, cache_door, cache_folder, cache_upkeep, degraded, extension, opened
+from lie_codegen.runtime import cache, cache_door, cache_folder, cache_upkeep, degraded, entry_library, extension
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, evict
 from lie_codegen.runtime.call import Compiled
@@ -171,14 +171,14 @@ def test_a_compiler_without_space_falls_back(tmp_path: Path, home: Path, monkeyp
 
 
 def test_a_folder_mounted_noexec_falls_back(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = opened.load_library
+    real = entry_library.load_library
 
     def refused(path: Path) -> Any:
         if home in path.parents:
             raise CacheError(f"{path}: failed to map segment from shared object")
         return real(path)
 
-    monkeypatch.setattr(opened, "load_library", refused)
+    monkeypatch.setattr(entry_library, "load_library", refused)
     with pytest.warns(CacheWarning, match=r"loads no library.*noexec"):
         library = build_kernels(lambda: [toy_kernels.RATE])
     assert library.path is not None

@@ -19,8 +19,8 @@ from lie_codegen.codegen.templates import template_folder
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.chain import end as chain_end
 from lie_codegen.steering.direct.compiled import machine
-from lie_codegen.steering.direct.flight import fly, landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.magnus_flow import end_reached, states_reached
 from lie_codegen.steering.direct.numpy_search import NumpySearch
 from lie_codegen.steering.direct.problem import manoeuvre
 from lie_codegen.steering.direct.programme import Settings
@@ -85,8 +85,8 @@ def test_the_end_of_constant_pieces_is_their_product_in_order(pieces: int, right
         E = expm(h * group.hat([*row, 1.0]))
         X = E @ X if right else X @ E
     drive = Drive(task.system, Inputs.constant(np.linspace(0, 3, pieces + 1), u))
-    np.testing.assert_allclose(landed(drive), X, atol=1e-14)
-    np.testing.assert_allclose(fly(drive, 3)[1][-1], X, atol=1e-14)
+    np.testing.assert_allclose(end_reached(drive), X, atol=1e-14)
+    np.testing.assert_allclose(states_reached(drive, 3)[1][-1], X, atol=1e-14)
 
 
 def test_goal_sets_cost_what_transversal_shooting_found() -> None:

@@ -18,11 +18,11 @@ from lie_codegen.steering.closed_form.averaged_end import TABULATED, averaged_en
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.fourier import Family
 from lie_codegen.steering.constraints import limits
-from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status, Stretched
 from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.extremals import SOLVED
 from lie_codegen.steering.shooting.shooter import shooter
+from lie_codegen.steering.simulated_plan import simulated_plan
 from lie_codegen.steering.task import Task
 from lie_codegen.values import Value
 
@@ -106,7 +106,9 @@ def area_rule(
     seconds = {"solve": time.perf_counter() - started}
     end = Status.SOLVED if exact else Status.APPROXIMATE
     otherwise = Status.NOT_CONVERGED if exact else Status.APPROXIMATE
-    return finish(task, "area_rule", _controls(task, family, best), details, seconds, solved=end, otherwise=otherwise)
+    return simulated_plan(
+        task, "area_rule", _controls(task, family, best), details, seconds, solved=end, otherwise=otherwise
+    )
 
 
 def _averaged_members(

@@ -24,9 +24,9 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError, SteeringInputError
 from lie_codegen.on_demand import scipy
 from lie_codegen.steering.closed_form.endpoint import approach, flow_end, sharpen
-from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status, Stretched
 from lie_codegen.steering.seeds import coordinates
+from lie_codegen.steering.simulated_plan import simulated_plan
 from lie_codegen.steering.task import Task
 from lie_codegen.values import Value
 
@@ -87,7 +87,7 @@ def circle(task: Task, *, exact: bool = True, starts: int = 8) -> Plan:
     end = Status.SOLVED if exact else Status.APPROXIMATE
     otherwise = Status.NOT_CONVERGED if exact else Status.APPROXIMATE
     u = _controls(task, turn)
-    return finish(task, "circle", u, details, seconds, solved=end, otherwise=otherwise, accuracy=1e-13)
+    return simulated_plan(task, "circle", u, details, seconds, solved=end, otherwise=otherwise, accuracy=1e-13)
 
 
 def _retuned(task: Task, guesses: list[Array]) -> tuple[Array, int]:

@@ -28,8 +28,8 @@ from lie_codegen.errors import NotOnGroupError, SteeringInputError
 from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.steering.closed_form.free_amplitude import LineAndCircles, free_amplitude
-from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.simulated_plan import simulated_plan
 from lie_codegen.steering.task import Task
 from lie_codegen.values import Value
 
@@ -81,7 +81,7 @@ def four_phase(task: Task, *, q: int | None = None, form: str = "product", ampli
         "constant": constant,
     }
     seconds = {"plan": time.perf_counter() - started}
-    return finish(task, "four_phase", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
+    return simulated_plan(task, "four_phase", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
 
 
 def _free(task: Task, axes: tuple[int, int, int], constant: float, gd: Any, form: str, q: int, started: float) -> Plan:
@@ -105,7 +105,7 @@ def _free(task: Task, axes: tuple[int, int, int], constant: float, gd: Any, form
     }
     seconds = {"plan": time.perf_counter() - started}
     u = Controls(law, [t for t in law.switches if 0 < t < task.duration])
-    return finish(task, "four_phase", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
+    return simulated_plan(task, "four_phase", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
 
 
 def average(plan: Plan, t: Array) -> Array:

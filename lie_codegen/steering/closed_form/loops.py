@@ -9,9 +9,9 @@ from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.on_demand import scipy
 from lie_codegen.steering.closed_form.chain import Chain
 from lie_codegen.steering.closed_form.segments import FigureEight, Loop
-from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Plan, Status
 from lie_codegen.steering.seeds import coordinates
+from lie_codegen.steering.simulated_plan import simulated_plan
 from lie_codegen.steering.task import Task
 
 _DEEPEST = 2
@@ -61,7 +61,7 @@ def loops(task: Task, *, exact: bool = True) -> Plan:
     end = Status.SOLVED if exact else Status.APPROXIMATE
     otherwise = Status.NOT_CONVERGED if exact else Status.APPROXIMATE
     u = chain.controls_over(task.duration)
-    return finish(task, "loops", u, details, seconds, solved=end, otherwise=otherwise, accuracy=1e-13)
+    return simulated_plan(task, "loops", u, details, seconds, solved=end, otherwise=otherwise, accuracy=1e-13)
 
 
 def _retuned(task: Task, chain: Chain) -> Chain:

@@ -22,8 +22,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, SteeringInputError
 from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.kernel.runge_kutta import propagators
-from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.simulated_plan import simulated_plan
 from lie_codegen.steering.task import Task
 
 _STEPS = 4096
@@ -92,7 +92,7 @@ def sinusoids(task: Task) -> Plan:
     }
     u = Controls(law, phase * np.arange(1, len(loops) + 1))
     seconds = {"plan": time.perf_counter() - started}
-    return finish(task, "sinusoids", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
+    return simulated_plan(task, "sinusoids", u, details, seconds, solved=Status.SOLVED, otherwise=Status.APPROXIMATE)
 
 
 def _chain(task: Task) -> tuple[int, int, list[tuple[int, float]]]:

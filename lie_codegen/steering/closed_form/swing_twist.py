@@ -21,8 +21,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringInputError
 from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.finish import finish
 from lie_codegen.steering.plan import Controls, Plan, Status
+from lie_codegen.steering.simulated_plan import simulated_plan
 from lie_codegen.steering.task import Task
 
 _TINY = 1e-15
@@ -101,7 +101,7 @@ def swing_twist(task: Task) -> Plan:
         "discretisation": "none: closed form, exact",
     }
     seconds = {"plan": time.perf_counter() - started}
-    return finish(
+    return simulated_plan(
         task,
         "swing_twist",
         Controls(law, inner),

@@ -27,8 +27,8 @@ from lie_codegen.steering.direct.arc_words import (
 )
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.compiled import machine
-from lie_codegen.steering.direct.flight import landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.magnus_flow import end_reached
 from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.direct.programme import Machine, Settings, chosen
 from lie_codegen.steering.direct.report import error_at, plan_of
@@ -219,7 +219,7 @@ def _flown(
         durations, values = durations[::-1], values[::-1]
     knots = np.concatenate([[0.0], np.cumsum(durations)])
     inputs = Inputs.constant(knots, values)
-    X = landed(Drive(task.system, inputs))
+    X = end_reached(Drive(task.system, inputs))
     left, right = one.free_motions(u)
     miss = task.end.left @ left @ X @ right @ task.end.right - task.end.values[variant]
     sequence = tuple((*map(float, controls), float(s)) for controls, s in zip(values, durations, strict=True))

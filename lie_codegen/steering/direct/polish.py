@@ -13,8 +13,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
-from lie_codegen.steering.direct.flight import landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.magnus_flow import end_reached
 from lie_codegen.steering.direct.programme import Machine, Programme, Settings
 from lie_codegen.steering.direct.search import once_more, restored
 
@@ -54,7 +54,7 @@ def as_inputs(task: Manoeuvre, u: Array, linear: bool) -> Inputs:
 def flown(task: Manoeuvre, u: Array, variant: int, linear: bool) -> Flown:
     """Where the controls (S, m) of a programme really lead."""
     inputs = as_inputs(task, u, linear)
-    X = landed(Drive(task.system, inputs))
+    X = end_reached(Drive(task.system, inputs))
     left, right = task.free_motions(u)
     end = task.end
     miss = end.left @ left @ X @ right @ end.right - end.values[variant]

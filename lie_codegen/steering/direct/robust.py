@@ -18,8 +18,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces
 from lie_codegen.steering.direct.compiled import machine
-from lie_codegen.steering.direct.flight import landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.magnus_flow import end_reached
 from lie_codegen.steering.direct.polish import Flown, as_inputs
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme
 from lie_codegen.steering.direct.report import error_at, fidelity, plan_of
@@ -232,7 +232,7 @@ def _step(x: Array, r: Array, J: Array, energy: Array, damped: Array, low: Array
 
 
 def _flown(task: Manoeuvre, inputs: Inputs, variant: int) -> Flown:
-    X = landed(Drive(task.system, inputs))
+    X = end_reached(Drive(task.system, inputs))
     eye = np.eye(task.system.group.degree)
     miss = task.end.left @ X @ task.end.right - task.end.values[variant]
     return Flown(inputs, X, float(np.linalg.norm(miss)), (eye, eye))

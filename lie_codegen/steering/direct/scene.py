@@ -14,8 +14,8 @@ from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.assemble import Manoeuvre, linear_pieces
 from lie_codegen.steering.direct.clear_search import Course, arrive, cheaper
 from lie_codegen.steering.direct.compiled import machine
-from lie_codegen.steering.direct.flight import fly
 from lie_codegen.steering.direct.inputs import Drive
+from lie_codegen.steering.direct.magnus_flow import states_reached
 from lie_codegen.steering.direct.numpy_search import Lanes, Rows, reach
 from lie_codegen.steering.direct.polish import Flown, corrected
 from lie_codegen.steering.direct.programme import Settings
@@ -228,7 +228,7 @@ class Scene:
         step = _LOOK * float(np.min(self.keep_out.sizes))
         drive, parts = Drive(self.task.system, flown.inputs), 4
         while True:
-            X = np.real(fly(drive, parts)[1])
+            X = np.real(states_reached(drive, parts)[1])
             moved = np.max(np.abs(np.diff(X @ self.keep_out.axes.T, axis=0)), initial=0.0)
             if moved <= step or parts >= _MOST_PARTS:
                 return X

@@ -17,8 +17,8 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
 from lie_codegen.steering.direct.chain import linearise
-from lie_codegen.steering.direct.flight import landed
 from lie_codegen.steering.direct.inputs import Drive, Inputs
+from lie_codegen.steering.direct.magnus_flow import end_reached
 from lie_codegen.steering.direct.polish import Flown
 from lie_codegen.steering.direct.programme import Programme
 
@@ -205,7 +205,7 @@ def _flown(task: Manoeuvre, durations: Array, controls: Array, variant: int) -> 
         durations, controls = durations[::-1], controls[::-1]
     knots = np.concatenate([[0.0], np.cumsum(durations)])
     inputs = Inputs.constant(knots * (task.duration / knots[-1]), controls)
-    X = landed(Drive(task.system, inputs))
+    X = end_reached(Drive(task.system, inputs))
     eye = np.eye(task.system.group.degree)
     miss = task.end.left @ X @ task.end.right - task.end.values[variant]
     return Flown(inputs, X, float(np.linalg.norm(miss)), (eye, eye))

@@ -30,8 +30,8 @@ from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 from lie_codegen.steering.start import placed, seen_from
 from lie_codegen.steering.task import Task, make_task
+from lie_codegen.steering.transcription.nondimensional import nondimensional
 from lie_codegen.steering.transcription.numbers import Dynamics, Numbers, Options
-from lie_codegen.steering.transcription.pose import pose
 
 #: Words of a round for each start asked for.
 _LANES = 16
@@ -105,7 +105,7 @@ def least_time_torques(
         return placed(plan, here)
     began = time.perf_counter()
     task = make_task(group, target, controls, duration, tolerance, torques=True)
-    _, numbers = pose(
+    _, numbers = nondimensional(
         task,
         Options(
             bounds=bounds, objective="time", longest=longest, dynamics=dynamics, inertia=inertia,

@@ -20,13 +20,13 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, SteeringError
-from lie_codegen.steering.finish import energy
 from lie_codegen.steering.optimal import ELSEWHERE, Shot, extremal_controls
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.shooting.extremals import SOLVED, Extremals
 from lie_codegen.steering.shooting.from_guess import nearest_costate
 from lie_codegen.steering.shooting.shooter import Shooter, shooter
 from lie_codegen.steering.shooting.transversal import Met, met
+from lie_codegen.steering.simulated_plan import energy
 from lie_codegen.steering.task import Task
 
 _MORE = 10

@@ -17,9 +17,9 @@ from lie_codegen.flow.logarithm import distance, matrix_log
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.mechanics.driven import simulate_driven
 from lie_codegen.mechanics.virtual_actuation import VirtualActuation, virtual_actuation
-from lie_codegen.steering.finish import energy
 from lie_codegen.steering.methods import OPEN_LOOP
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status
+from lie_codegen.steering.simulated_plan import energy
 from lie_codegen.steering.symmetric_product.oscillation import Oscillation, balanced
 from lie_codegen.steering.symmetric_product.primitives import Primitives, primitives
 from lie_codegen.steering.symmetric_product.retune import Retuned, retune

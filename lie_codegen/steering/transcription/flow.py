@@ -21,7 +21,7 @@ _MOST = 1024
 
 
 @dataclass(frozen=True)
-class Flight:
+class SimulatedPath:
     """A trajectory of the true system in units of the task's duration.
 
     Attributes:
@@ -35,7 +35,7 @@ class Flight:
     xi: Array
 
 
-def fly(
+def simulated_path(
     group: MatrixGroup,
     controls: tuple[int, ...],
     numbers: Numbers,
@@ -43,13 +43,13 @@ def fly(
     duration: float,
     fine: int = FINE,
     tolerance: float = _TOLERANCE,
-) -> Flight:
+) -> SimulatedPath:
     """The motion under v (N + 1, m) at the knots, linear between them, at `fine` times an interval; even."""
     t = np.linspace(0, duration, fine * (len(v) - 1) + 1)
     if numbers.dynamics is not None:
         force = piecewise_linear(group, controls, v, duration)
         run = simulate_driven(group, force, numbers.dynamics.inertia, t=t, xi0=numbers.dynamics.ends[0])
-        return Flight(t, run.X, run.xi)
+        return SimulatedPath(t, run.X, run.xi)
     velocities = np.tile(numbers.drift, (len(v), 1))
     velocities[:, list(controls)] += v
     parts, coarse = fine, _run(group, velocities, duration, fine // 2)[:: fine // 2]
@@ -58,7 +58,7 @@ def fly(
         nodes = states[::parts]
         off = float(np.max(np.abs(nodes - coarse))) / 15
         if (off <= tolerance * max(1.0, float(np.max(np.abs(nodes))))) or parts >= _MOST or not np.isfinite(off):
-            return Flight(t, states[:: parts // fine], _between(velocities, fine))
+            return SimulatedPath(t, states[:: parts // fine], _between(velocities, fine))
         parts, coarse = 2 * parts, nodes
 
 

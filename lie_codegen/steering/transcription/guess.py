@@ -18,7 +18,7 @@ from lie_codegen.steering.seeds import coordinates, seed_controls
 from lie_codegen.steering.shooting.extremals import SOLVED
 from lie_codegen.steering.shooting.shooter import shooter
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.flow import fly
+from lie_codegen.steering.transcription.flow import simulated_path
 from lie_codegen.steering.transcription.layout import joined
 from lie_codegen.steering.transcription.numbers import Numbers, over
 from lie_codegen.steering.transcription.structure import Structure
@@ -128,7 +128,7 @@ def first_variables(task: Task, structure: Structure, numbers: Numbers, v: Array
         fast = np.abs(np.diff(v, axis=0)) * structure.intervals
         need = max(1.05 * np.max(numbers.ratios(v)), np.sqrt(np.max(over(fast, numbers.rates))))
         scale = float(np.clip(need, 1e-3, 0.9 * numbers.longest))
-    states = fly(task.group, task.controls, numbers, v / scale, scale, _COARSE, _LOOSE).X[::_COARSE]
+    states = simulated_path(task.group, task.controls, numbers, v / scale, scale, _COARSE, _LOOSE).X[::_COARSE]
     if not np.all(np.isfinite(states)):
         raise ComputationError(f"steer({task.group.name}): a first guess leaves the range of double precision")
     return joined(structure, states, None, v / scale, scale)
@@ -147,7 +147,7 @@ def smooth_torques(task: Task, structure: Structure, numbers: Numbers, v: Array)
     s = 3 * t**2 - 2 * t**3
     eased = np.stack([np.interp(s, t, column) for column in v.T], axis=1) * (6 * t * (1 - t))[:, None]
     still = Numbers(**{**vars(numbers), "dynamics": None})
-    states = fly(task.group, task.controls, still, eased, 1.0, _COARSE, _LOOSE).X[::_COARSE]
+    states = simulated_path(task.group, task.controls, still, eased, 1.0, _COARSE, _LOOSE).X[::_COARSE]
     xi = np.zeros((len(t), task.group.dim))
     xi[:, list(structure.controls)] = eased
     momentum = xi @ second.inertia

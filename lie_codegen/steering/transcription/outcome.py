@@ -11,7 +11,7 @@ import numpy as np
 from lie_codegen.steering.obstacles.homotopy import planar_discs
 from lie_codegen.steering.obstacles.path_guess import word_text
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.flow import fly
+from lie_codegen.steering.transcription.flow import simulated_path
 from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.solve import Candidate
 
@@ -47,4 +47,4 @@ def nearest_flown(task: Task, numbers: Numbers, candidates: Sequence[Candidate])
     nearest = min(usable, key=lambda each: (each.violation, each.miss))
     if nearest.flight is not None:
         return nearest
-    return replace(nearest, flight=fly(task.group, task.controls, numbers, nearest.values, nearest.duration))
+    return replace(nearest, flight=simulated_path(task.group, task.controls, numbers, nearest.values, nearest.duration))

@@ -9,14 +9,14 @@ from lie_codegen.groups.maps.rkmk import times_taylor_exp
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.on_demand import casadi as ca
-from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
+from lie_codegen.steering.transcription.stage_functions import StageFunctions, Symbols, named_function, symbols
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import pushed
 
 _WITHIN = 0.5
 
 
-def path(structure: Structure, kind: str) -> Piece:
+def path(structure: Structure, kind: str) -> StageFunctions:
     """The conditions at a node: zero, X = goal; then not below zero: its half-space, clearances, and limits on rates where time is free.
 
     Args:
@@ -40,7 +40,7 @@ def path(structure: Structure, kind: str) -> Piece:
     inputs = {"w": at.w, "p": at.p, "goal": at.goal}
     weighted = {**inputs, "factor": factor, "multipliers": multipliers}
     curve, slope = ca.hessian(ca.dot(multipliers, g), at.w)
-    return Piece(
+    return StageFunctions(
         value=named_function(f"{kind}_value", inputs, [g]),
         slope=named_function(f"{kind}_slope", inputs, [g, ca.jacobian(g, at.w)]),
         curve=named_function(f"{kind}_curve", weighted, [ca.densify(slope), curve]),

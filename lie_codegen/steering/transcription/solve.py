@@ -14,7 +14,7 @@ from lie_codegen.steering.constraints import Cone
 from lie_codegen.steering.obstacles.tunnels import tunnels
 from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.flow import Flight, fly
+from lie_codegen.steering.transcription.flow import SimulatedPath, simulated_path
 from lie_codegen.steering.transcription.layout import (
     at_rest,
     free_motion,
@@ -82,7 +82,7 @@ class Candidate:
     violation: float
     target: Array
     miss: float
-    flight: Flight | None
+    flight: SimulatedPath | None
     solution: Array
     solves: tuple[Solve, ...]
 
@@ -98,7 +98,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Aim:
+class ProgramEnd:
     """Where the program is told to end, so that the true system ends where it must: X, and xi to second order."""
 
     X: Array
@@ -116,12 +116,12 @@ class Workbench:
     say: Callable[[str], None]
 
 
-def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candidate:
+def refined(bench: Workbench, name: str, start: Array, first_end: ProgramEnd) -> Candidate:
     """Solves, and again with the aim corrected by the true system's miss, obstacles enlarged where the path cuts them, and the
     target moved along the directions that the goal leaves free."""
     task, numbers = bench.task, bench.numbers
     second = numbers.dynamics
-    aim, margins = first_aim, np.zeros(len(numbers.obstacles))
+    aim, margins = first_end, np.zeros(len(numbers.obstacles))
     solves: list[Solve] = []
     best: Candidate | None = None
     moving = False
@@ -136,7 +136,7 @@ def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candid
                 solve.objective, values, duration, solve.violation, target, np.inf, None, solution, tuple(solves)
             )
             return failed if best is None else replace(best, solves=tuple(solves))
-        flight = fly(task.group, task.controls, numbers, values, duration)
+        flight = simulated_path(task.group, task.controls, numbers, values, duration)
         if tunnels(numbers.obstacles, flight.X):
             # through a seam between discs, in one fast step: to enlarge the discs would find the next seam
             tunnel = Candidate(
@@ -158,7 +158,7 @@ def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candid
         moving = not settled
         if (settled and deepest <= _CLEAR and off <= _EXACT) or off > _ASTRAY:
             break
-        aim = Aim(aim.X @ np.linalg.solve(task.target, target) @ relative, aim.xi + slip)
+        aim = ProgramEnd(aim.X @ np.linalg.solve(task.target, target) @ relative, aim.xi + slip)
         task = replace(task, target=target)
         margins = margins + _PUSH * cut
         start = at_rest(bench.structure, solution)
@@ -167,7 +167,7 @@ def refined(bench: Workbench, name: str, start: Array, first_aim: Aim) -> Candid
     return replace(best, solves=tuple(solves))
 
 
-def predicted_aim(bench: Workbench, start: Array) -> Aim:
+def predicted_end(bench: Workbench, start: Array) -> ProgramEnd:
     """Where the program should end for the true system to hit the target, judged by a guess made of true states.
 
     At true states the program's gaps are its errors of each step, which the rest of the way carries to the end.
@@ -175,7 +175,7 @@ def predicted_aim(bench: Workbench, start: Array) -> Aim:
     task, structure = bench.task, bench.structure
     second = bench.numbers.dynamics
     if second is not None:
-        return Aim(task.target, second.ends[1])
+        return ProgramEnd(task.target, second.ends[1])
     p = _parameters(bench, np.zeros(len(bench.numbers.obstacles)), task.target)
     g = np.asarray(bench.built.solver.get_function("nlp_g")(start, p)).ravel()
     rows = bench.built.gap_rows[:, None] + np.arange(structure.size)
@@ -184,11 +184,11 @@ def predicted_aim(bench: Workbench, start: Array) -> Aim:
     carried = np.linalg.solve(states, np.broadcast_to(states[-1], states.shape))
     end = states[-1] + np.sum(errors @ carried, axis=0)
     if not np.all(np.isfinite(end)):
-        return Aim(task.target, np.zeros(task.group.dim))
-    return Aim(task.target @ np.linalg.solve(states[-1], end), np.zeros(task.group.dim))
+        return ProgramEnd(task.target, np.zeros(task.group.dim))
+    return ProgramEnd(task.target @ np.linalg.solve(states[-1], end), np.zeros(task.group.dim))
 
 
-def _solve(bench: Workbench, name: str, margins: Array, aim: Aim, start: Array) -> tuple[Array, Solve]:
+def _solve(bench: Workbench, name: str, margins: Array, aim: ProgramEnd, start: Array) -> tuple[Array, Solve]:
     structure, built = bench.structure, bench.built
     low, high = variable_limits(structure, bench.numbers, aim.xi)
     asked = tightened(low, high) if built.name == "fatrop" else (low, high)

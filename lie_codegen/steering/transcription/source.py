@@ -9,8 +9,8 @@ from lie_codegen.on_demand import casadi as ca
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.steering.transcription.nlp_source import Condition, Layout, render_nlp
 from lie_codegen.steering.transcription.path import path
-from lie_codegen.steering.transcription.piece import Piece
 from lie_codegen.steering.transcription.stage import interval
+from lie_codegen.steering.transcription.stage_functions import StageFunctions
 from lie_codegen.steering.transcription.structure import KINDS, Structure
 
 
@@ -78,11 +78,11 @@ def _dense(function: Any) -> Any:
     return ca.Function(function.name(), inputs, outputs, names, [f"out{i}" for i in range(len(outputs))], {"cse": True})
 
 
-def _own_curve(piece: Piece, pattern: Any) -> Any:
+def _own_curve(piece: StageFunctions, pattern: Any) -> Any:
     return piece.curve.sparsity_out(1) * pattern
 
 
-def _curve(piece: Piece, pattern: Any, *, interval: bool) -> Any:
+def _curve(piece: StageFunctions, pattern: Any, *, interval: bool) -> Any:
     """The gradient, and the nonzeros of the Hessian in the stage's pattern, or its own."""
     function = piece.curve
     inputs = [ca.SX.sym(function.name_in(i), function.sparsity_in(i)) for i in range(function.n_in())]

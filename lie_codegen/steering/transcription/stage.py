@@ -24,7 +24,7 @@ from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.kernel.linear import matmul
 from lie_codegen.mechanics.driven_step import driven_increments
 from lie_codegen.on_demand import casadi as ca
-from lie_codegen.steering.transcription.piece import Piece, Symbols, named_function, symbols
+from lie_codegen.steering.transcription.stage_functions import StageFunctions, Symbols, named_function, symbols
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import ad_matrix, push, pushed, wedge
 
@@ -33,7 +33,7 @@ _EXPONENTIAL_DEGREE = 9
 _SLOPE_DEGREE = 7
 
 
-def interval(structure: Structure) -> Piece:
+def interval(structure: Structure) -> StageFunctions:
     """The next (S, v, s, h), and the cost of the interval."""
     at, group, size = symbols(structure), structure.group, structure.size
     S, q = at.parts["X"], at.w[size:]
@@ -66,7 +66,7 @@ def interval(structure: Structure) -> Piece:
     slope = ca.gradient(factor * cost + ca.dot(mu, others), at.w)
     inputs = {"w": at.w, "p": at.p}
     weighted = {**inputs, "factor": factor, "multipliers": multipliers}
-    return Piece(
+    return StageFunctions(
         value=named_function("interval_value", inputs, [rows]),
         slope=named_function("interval_slope", inputs, [rows, jacobian]),
         curve=named_function("interval_curve", weighted, [ca.densify(gradient + slope), _symmetric(curve + more)]),

@@ -21,7 +21,7 @@ from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.steering.plan import Facts, Plan, Status
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.complaint import complaint, ends_in_obstacles
+from lie_codegen.steering.transcription.failure_report import ends_in_obstacles, failure_report
 from lie_codegen.steering.transcription.flow import piecewise_linear
 from lie_codegen.steering.transcription.guess import (
     class_guesses,
@@ -30,11 +30,11 @@ from lie_codegen.steering.transcription.guess import (
     given_guess,
     guesses,
 )
+from lie_codegen.steering.transcription.nondimensional import nondimensional
 from lie_codegen.steering.transcription.numbers import Numbers, Options
 from lie_codegen.steering.transcription.outcome import classes_found, nearest_flown
-from lie_codegen.steering.transcription.pose import pose
 from lie_codegen.steering.transcription.problem import endable, program
-from lie_codegen.steering.transcription.solve import Aim, Candidate, Workbench, predicted_aim, refined
+from lie_codegen.steering.transcription.solve import Candidate, ProgramEnd, Workbench, predicted_end, refined
 from lie_codegen.steering.transcription.structure import Structure
 
 _FALLBACK = 4
@@ -78,7 +78,7 @@ def _run(
     task: Task, asked: Options, method: str, tried: tuple[str, ...], progress: Callable[[str], None] | None
 ) -> Plan:
     started = time.perf_counter()
-    structure, numbers = pose(task, asked)
+    structure, numbers = nondimensional(task, asked)
     if blocked := ends_in_obstacles(task, numbers):
         raise SteeringError(
             f"steer({task.group.name}): no admissible manoeuvre; {'; '.join(blocked)}; move one of them"
@@ -100,7 +100,7 @@ def _run(
             break
     good = [candidate for candidate in candidates if candidate.admissible]
     if not good:
-        said = complaint(task, structure, numbers, candidates)
+        said = failure_report(task, structure, numbers, candidates)
         nearest = nearest_flown(task, numbers, candidates)
         if nearest is None:
             raise SteeringError(said)
@@ -127,14 +127,14 @@ def _candidates(bench: Workbench, asked: Options) -> list[Candidate]:
     for name, v in _guesses(bench, asked):
         try:
             first = first_variables(bench.task, bench.structure, bench.numbers, v)
-            found.append(refined(bench, name, first, predicted_aim(bench, first)))
+            found.append(refined(bench, name, first, predicted_end(bench, first)))
         except ComputationError as error:
             bench.say(f"from {name}: {error}")
     if found and found[0].admissible and _idle(bench.numbers, found[0]):
         return found  # the first guess is the optimum without obstacles, and meets none of them
     for each in class_guesses(bench.task, bench.structure, bench.numbers, asked.classes, _TURNS):
         first = class_variables(bench.structure, bench.numbers, each)
-        found.append(refined(bench, each.name, first, Aim(bench.task.target, np.zeros(bench.task.group.dim))))
+        found.append(refined(bench, each.name, first, ProgramEnd(bench.task.target, np.zeros(bench.task.group.dim))))
     return found
 
 

@@ -25,7 +25,7 @@ from lie_codegen.steering.wheels.motion import (
     WheelRun,
     axial_momenta,
     element_of,
-    opened,
+    unpacked_states,
     violation,
 )
 
@@ -75,7 +75,7 @@ def closed_loop_of(
     }
     along: dict[str, Any] = {name: values[:-1][None] if tracks else values for name, values in desired.items()}
     states = step.scan_batch(starts, n=count, every=every, threads=threads, h=h, **fixed, **along, **noises)
-    X, omega, speeds = opened(system, states)
+    X, omega, speeds = unpacked_states(system, states)
     torques = _torques(step, states, {**fixed, **desired}, noises, every, h, tracks)
     goal = desired["target"][::every] if tracks else desired["target"]
     run = WheelRun(

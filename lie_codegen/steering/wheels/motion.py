@@ -203,10 +203,10 @@ def under_torques(
         return np.asarray(step.scan(packed, system.stored, a, b, c, h, n=len(h), every=every))
 
     def speed(states: Array) -> float:
-        return _largest(opened(system, states)[1])
+        return _largest(unpacked_states(system, states)[1])
 
     states, every, error = _refined(run, times, speed, tolerance)
-    X, omega, speeds = opened(system, states)
+    X, omega, speeds = unpacked_states(system, states)
     torques = np.array(given(times))
     return WheelRun(
         t=times,
@@ -231,7 +231,7 @@ def axial_momenta(system: WheeledBody, X: Array, speeds: Array) -> Array:
     return np.asarray(axial * (system.body_rate(speeds, X) @ system.axes.T + speeds))
 
 
-def opened(system: WheeledBody, states: Array) -> tuple[Array, Array, Array]:
+def unpacked_states(system: WheeledBody, states: Array) -> tuple[Array, Array, Array]:
     """X, body rates and wheel speeds of packed states (X, axial momenta)."""
     size = packed_size(system.group)
     padded = np.concatenate([states[..., :size], np.zeros((*states.shape[:-1], system.group.dim))], axis=-1)

@@ -16,7 +16,9 @@ from lie_codegen.runtime.lane_library import LaneLibrary
 _MOST_PORTS = 32
 
 
-def quick(compiled: Compiled[Any], library: ctypes.CDLL, lanes: LaneLibrary, signature: Signature) -> Compiled[Any]:
+def extension_function(
+    compiled: Compiled[Any], library: ctypes.CDLL, lanes: LaneLibrary, signature: Signature
+) -> Compiled[Any]:
     """`compiled` behind a fast path for exact arguments; itself where there is no extension, or it computes in floats.
 
     What the fast path does not take, and every attribute but `batch`, is that of `compiled`.

@@ -10,7 +10,7 @@ from lie_codegen.steering.transcription.structure import Structure
 
 
 @dataclass(frozen=True)
-class Piece:
+class StageFunctions:
     """A vector of functions of a stage, and a part of the objective, in SX.
 
     Attributes:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.backend import CtypesBackend, load_library
 from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.extension_function import extension_function
 from lie_codegen.runtime.lane_library import LaneLibrary
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.quick import quick
 
 
 def open_entry(entry: cache.Entry) -> Library:
@@ -19,7 +19,9 @@ def open_entry(entry: cache.Entry) -> Library:
     shared = load_library(entry.library)
     lanes = LaneLibrary(entry, shared)
     functions = [
-        quick(Compiled(signature, CtypesBackend(shared, signature, lanes), compiled=True), shared, lanes, signature)
+        extension_function(
+            Compiled(signature, CtypesBackend(shared, signature, lanes), compiled=True), shared, lanes, signature
+        )
         for signature in entry.signatures
     ]
     how = "the extension type" if functions and not isinstance(functions[0], Compiled) else "ctypes"

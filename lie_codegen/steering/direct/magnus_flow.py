@@ -17,10 +17,10 @@ _AGREE = 1e-13
 _MOST = 256
 
 
-def landed(drive: Drive) -> Array:
+def end_reached(drive: Drive) -> Array:
     """(d, d) where the true system ends under the inputs of `drive`, drift included."""
     if not _one_exponential(drive):
-        return np.asarray(fly(drive)[1][-1])
+        return np.asarray(states_reached(drive)[1][-1])
     knots, system = drive.inputs.knots, drive.system
     E = _exponentials(drive, knots[:-1], np.diff(knots))
     # neighbours are multiplied side by side: six products of arrays for 48 pieces, not 48 of matrices
@@ -31,7 +31,7 @@ def landed(drive: Drive) -> Array:
     return np.asarray(E[0] @ system.start if system.right else system.start @ E[0])
 
 
-def fly(drive: Drive, parts: int = 1) -> tuple[Array, Array]:
+def states_reached(drive: Drive, parts: int = 1) -> tuple[Array, Array]:
     """Times (K parts + 1,) and states (K parts + 1, d, d) under the inputs of `drive`, drift included."""
     knots = drive.inputs.knots
     if _one_exponential(drive):

@@ -8,14 +8,14 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.flow import fly
+from lie_codegen.steering.transcription.flow import simulated_path
 from lie_codegen.steering.transcription.guess import guesses, smooth_torques
 from lie_codegen.steering.transcription.numbers import Numbers, over
 from lie_codegen.steering.transcription.solve import Candidate
 from lie_codegen.steering.transcription.structure import Structure
 
 
-def complaint(task: Task, structure: Structure, numbers: Numbers, candidates: Sequence[Candidate]) -> str:
+def failure_report(task: Task, structure: Structure, numbers: Numbers, candidates: Sequence[Candidate]) -> str:
     """One line: the limits in the way, most important first, and what to try."""
     lines = [f"steer({task.group.name}): no admissible manoeuvre"]
     if candidates:
@@ -53,7 +53,7 @@ def _needs(task: Task, structure: Structure, numbers: Numbers, v: Array) -> list
     labels = [task.group.labels[i] for i in structure.controls]
     if numbers.dynamics is None:
         needs, what = v, "without limits the least-energy manoeuvre needs"
-        states = fly(task.group, task.controls, numbers, v, 1.0).X
+        states = simulated_path(task.group, task.controls, numbers, v, 1.0).X
     else:
         what = "the first guess needs"
         states, xi, needs = smooth_torques(task, structure, numbers, v)

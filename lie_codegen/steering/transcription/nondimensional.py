@@ -21,7 +21,7 @@ from lie_codegen.steering.transcription.structure import Structure
 SOLVERS = ("auto", "fatrop", "ipopt")
 
 
-def pose(task: Task, asked: Options) -> tuple[Structure, Numbers]:
+def nondimensional(task: Task, asked: Options) -> tuple[Structure, Numbers]:
     """The structure and the numbers.
 
     Raises:

@@ -33,13 +33,13 @@ def energy(u: Controls, duration: float) -> float:
     return float(np.sum(values @ _WEIGHTS * widths / 2))
 
 
-def flown_end(group: MatrixGroup, u: Controls, duration: float, accuracy: float = 1e-11) -> Array:
+def simulated_end(group: MatrixGroup, u: Controls, duration: float, accuracy: float = 1e-11) -> Array:
     """(d, d) where the true system ends."""
     end: Array = simulate(group, u, t=[0.0, duration], tolerance=accuracy).X[-1]
     return end
 
 
-def finish(
+def simulated_plan(
     task: Task,
     method: str,
     u: Controls,
@@ -58,7 +58,7 @@ def finish(
     """
     started = time.perf_counter()
     if end is None:
-        end = flown_end(task.group, u if drift is None else u.plus(drift), task.duration, accuracy)
+        end = simulated_end(task.group, u if drift is None else u.plus(drift), task.duration, accuracy)
     error = distance(task.group, task.target, end)
     return Plan(
         group=task.group,
