@@ -171,6 +171,7 @@ def _positive(
 ) -> bool:
     phi, gradient = ErrorDerivatives(ops, error, real, X, X).differential(1)
     zero = all(abs(value) <= ops.constant(tolerance) for value in (phi, *gradient))
+    # symmetric but for rounding: the two orders of A_a and A_b differ by d phi . [A_a, A_b], and d phi = 0 here
     values = np.linalg.eigvalsh((np.array(hessian) + np.array(hessian).T) / 2)
     return bool(zero and values[0] > 1e-12 * max(1e-300, abs(values[-1])))
 

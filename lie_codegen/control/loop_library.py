@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.control.curve_reference import CurveReference, curve_kernel
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
 from lie_codegen.control.loop_model import NOISE, Loop, loop_model
 from lie_codegen.control.loop_rate import has_rate, loop_rate, loop_settle
-from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.definition import plain
@@ -62,9 +61,7 @@ def _made(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Lib
         kernels = [loop_rate(model, reference), loop_settle(model)]
     kernels += [loop_outputs(model)] if model.law is not None else []
     if reference is not None:
-        kernels.append(
-            curve_kernel(reference) if isinstance(reference, CurveReference) else reference_kernel(reference)
-        )
+        kernels.append(motion_kernel(reference))
     library = build_kernels(lambda: kernels, namespace=model.plant.namespace, definition=defined_together(kernels))
     return model, library
 

@@ -11,10 +11,9 @@ import numpy as np
 from lie_codegen.codegen.opcodes import REALS
 from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.codegen.templates import render
-from lie_codegen.control.curve_reference import CurveReference, curve_kernel
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_step
 from lie_codegen.control.loop_run import Run
-from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.errors import CodegenError, InputError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.kernel import Kernel
@@ -61,7 +60,7 @@ def loop_parts(run: Run, reference: Any, parts: int, name: str | None, real: str
     kernels: list[Kernel] = [loop.law.kernel]
     moving: list[Kernel] = []
     if reference is not None:
-        moving = [curve_kernel(reference) if isinstance(reference, CurveReference) else reference_kernel(reference)]
+        moving = [motion_kernel(reference)]
     own = [loop_control(loop), loop_motion(loop)] if sampled else [loop_step(loop)]
     view = _view(quiet, parts, package, real, own, moving)
     files = {f"{package}_loop.c": render("loop_replay.c.jinja", loop=view)}

@@ -9,11 +9,10 @@ import random
 from collections.abc import Sequence
 from typing import Any
 
-from lie_codegen.control.curve_reference import CurveReference, curve_kernel
 from lie_codegen.control.loop_call import COMMAND, called, limited
 from lie_codegen.control.loop_model import Loop
 from lie_codegen.control.plants import GroupPlant
-from lie_codegen.control.reference_kernels import reference_kernel
+from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.flow.product_rate import product_rate
 from lie_codegen.flow.product_step import Move
 from lie_codegen.groups.maps.element_pattern import pack, packed_size, unpack
@@ -57,7 +56,7 @@ def loop_rate(loop: Loop, reference: Any = None, name: str = "loop_rate") -> Ker
     size, extent = turns + len(vectors), len(packed) + len(vectors)
     follows = None
     if loop.moving:
-        follows = curve_kernel(reference) if isinstance(reference, CurveReference) else reference_kernel(reference)
+        follows = motion_kernel(reference)
 
     def body(ops: Arithmetic, X: Vector, y: Vector, t: Scalar, *rest: Any) -> tuple[Any, ...]:
         given = dict(zip((port.name for port in numbers), rest, strict=True))

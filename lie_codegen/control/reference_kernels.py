@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lie_codegen.control.curve_reference import CurveReference, curve_reference
+from lie_codegen.control.curve_reference import CurveReference, curve_kernel, curve_reference
 from lie_codegen.control.manifold import Manifold
 from lie_codegen.control.reference_motion import (
     FormulaReference,
@@ -33,6 +33,11 @@ from lie_codegen.kernel.linear import Matrix, Vector, matvec
 
 if TYPE_CHECKING:
     from lie_codegen.control.plan_reference import Planned, PlanOnGroup
+
+
+def motion_kernel(reference: Reference | CurveReference) -> Kernel:
+    """What a reference is at a time, on a group or in coordinates."""
+    return curve_kernel(reference) if isinstance(reference, CurveReference) else reference_kernel(reference)
 
 
 @kernel_factory()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +22,7 @@ from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.extremals import SOLVED
 from lie_codegen.steering.shooting.numpy_solver import NumpyShooting
 from lie_codegen.steering.shooting.shooter import shooter
+from lie_codegen.steering.shooting.source import PROBLEM, render_steering, steering_view
 
 SYSTEMS = {"so3": ("w1", "w2"), "se2": (0, 1), "h3": (0, 1), "su2": (0, 1), "se3": (0, 1, 2, 3)}
 
@@ -158,6 +161,20 @@ def test_numpy_stands_in_for_the_compiler(name: str) -> None:
     np.testing.assert_allclose(a.cost, b.cost, rtol=1e-8)
     extremal = Extremal(group, (0, 1), np.ones(2), b.mu0[0], plain.sample(b.mu0[0], np.ones(2), 33))
     np.testing.assert_allclose(extremal.X[-1], target[0], atol=1e-8)
+
+
+def test_when_shooting_stops_is_said_once_for_c_and_numpy() -> None:
+    """The numbers of `Defaults` reach the header that the C core reads, and a rule that nothing meets stops the search in numpy."""
+    group, strict = lc.group("se2"), Defaults(8, 12, 12, search_residual=0.0, polish_share=0.25, most_damping=512.0)
+    texts = render_steering(replace(steering_view(group, (0, 1), 1), defaults=strict))
+    numbers = dict(re.findall(r"#define (SEARCH_RESIDUAL|POLISH_SHARE|MOST_DAMPING) (\S+)", texts[PROBLEM]))
+    assert {name: float(value) for name, value in numbers.items()} == {
+        "SEARCH_RESIDUAL": 0.0, "POLISH_SHARE": 0.25, "MOST_DAMPING": 512.0,
+    }  # fmt: skip
+    core = next(text for name, text in texts.items() if name.endswith(".c"))
+    assert all(name in core for name in numbers)
+    target = random_targets(group, 1, seed=2, size=0.6)
+    assert NumpyShooting(group, (0, 1), 1, strict).solve(target, np.ones(2), 8).converged[0] == 0
 
 
 def gell_mann() -> MatrixGroup:

@@ -67,6 +67,7 @@ class Oscillation(Value):
             P = self.balance[i]
             p, q = P * z, -2 * c_hat[:, i] * z / P
             p_dot, q_dot = P * slope, -2 * (c_hat_dot[:, i] * z + c_hat[:, i] * slope) / P
+            # mean U_a U_b = p q / 2 = -c pushes by c <Y_a : Y_b>, as wanted; mean U_a^2 = p^2 / 2 pushes by -p^2/4 <Y_a : Y_a>, which v takes back
             for force, size, size_dot in ((a, p, p_dot), (b, q, q_dot)):
                 U[:, force] += size * np.sin(angle)
                 rate[:, force] += size_dot * np.sin(angle) + size * turning * np.cos(angle)
