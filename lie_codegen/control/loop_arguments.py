@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.curve_reference import CurveReference, curve_reference
-from lie_codegen.control.loop_model import NOISE
+from lie_codegen.control.loop_model import NOISE, SIGMAS
 from lie_codegen.control.loop_ports import LoopLaw, moving_law, read_law
 from lie_codegen.control.loop_times import error_goal, is_number, read_times, sampling
 from lie_codegen.control.plants import GroupPlant, Plant, group_plant
@@ -281,7 +281,7 @@ def _noise(
     if plant.order == 1 and observer is None and {"xi", "bias"} & set(noise):
         raise InputError("closed_loop: noise on xi, which a loop whose law commands the velocity does not measure")
     for name, value in noise.items():
-        numbers["bias" if name == "bias" else f"sigma_{name}"] = value
+        numbers["bias" if name == "bias" else SIGMAS[name]] = value
     return tuple(kind for kind in NOISE if kind in noise), "bias" in noise
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lie_codegen.control.loop_model import Loop, Own
+from lie_codegen.control.loop_model import SIGMAS, Loop, Own
 from lie_codegen.control.loop_ports import seen_directions
 from lie_codegen.control.plants import GroupPlant
 from lie_codegen.groups.derivation import derivation_of
@@ -141,5 +141,5 @@ def _normals(ops: Arithmetic, loop: Loop, numbers: Mapping[str, Any]) -> list[Ve
             angle = turn * numbers["noise"][pair + 1]
             row += [length * ops.cos(angle), length * ops.sin(angle)]
         place += -(-size // 4) * 4
-        found.append([sigma * x for sigma, x in zip(numbers[f"sigma_{kind}"], row[:size], strict=True)])
+        found.append([sigma * x for sigma, x in zip(numbers[SIGMAS[kind]], row[:size], strict=True)])
     return found

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
-from lie_codegen.control.loop_model import NOISE, Loop, loop_model
+from lie_codegen.control.loop_model import SIGMAS, Loop, loop_model
 from lie_codegen.control.loop_rate import has_rate, loop_rate, loop_settle
 from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
@@ -121,7 +121,8 @@ def spread(port: Port, value: ArrayLike) -> Array:
     Raises:
         ShapeError, InputError, NotFiniteError: naming it.
     """
-    what = {f"sigma_{kind}": f"noise[{kind!r}]" for kind in NOISE}.get(port.name, port.name)
+    noise = next((kind for kind, name in SIGMAS.items() if name == port.name), None)
+    what = port.name if noise is None else f"noise[{noise!r}]"
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -136,7 +137,7 @@ def spread(port: Port, value: ArrayLike) -> Array:
         raise ShapeError(
             f"closed_loop: {what} has shape {array.shape}; give a number, {port.shape} or (N, {port.shape[0]})"
         )
-    if port.name.startswith("sigma") and np.any(array < 0):
+    if noise is not None and np.any(array < 0):
         raise InputError(f"closed_loop: {what} is negative; it is a standard deviation")
     if port.name == "limits" and not np.all(array > 0):
         raise InputError("closed_loop: limits must be positive: the largest magnitude of each component of the command")

@@ -21,6 +21,8 @@ from lie_codegen.kernel.linear import Vector, plus, scaled
 
 #: What noise may be put on, in the order in which its numbers are drawn.
 NOISE = ("X", "xi", "u", "y")
+#: The number of a loop that is the standard deviation of each.
+SIGMAS = {kind: f"sigma_{kind}" for kind in NOISE}
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,7 @@ class Loop:
             ports["disturbance"] = Port("disturbance", command, description="constant, beside the command")
         if noisy:
             for kind, size in zip(self.noise, self.noise_sizes, strict=True):
-                ports[f"sigma_{kind}"] = Port(f"sigma_{kind}", (size,), description=f"standard deviation of {kind}")
+                ports[SIGMAS[kind]] = Port(SIGMAS[kind], (size,), description=f"standard deviation of {kind}")
             if self.biased:
                 ports["bias"] = Port("bias", self.plant.ports[1].shape, description="of the measured velocity")
             if self.noise:

@@ -12,6 +12,7 @@ from lie_codegen.codegen.opcodes import REALS
 from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.codegen.templates import render
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_step
+from lie_codegen.control.loop_model import SIGMAS
 from lie_codegen.control.loop_run import Run
 from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.errors import CodegenError, InputError
@@ -103,7 +104,7 @@ def _quiet(run: Run) -> Run:
     numbers = {}
     for name, value in run.numbers.items():
         first = value[0] if value.ndim > ranks[name] else value
-        numbers[name] = np.zeros_like(first) if name.startswith("sigma_") else first
+        numbers[name] = np.zeros_like(first) if name in SIGMAS.values() else first
     return replace(run, start=np.ascontiguousarray(run.start[:1]), numbers=numbers, many=False)
 
 

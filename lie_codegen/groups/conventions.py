@@ -29,7 +29,9 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import NEAR_GROUP, ON_GROUP
+from lie_codegen.groups.maps.quaternion import quaternion_order, rotation_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.shapes import shaped
 
 #: library -> group -> our labels in the library's order.
 TANGENT_ORDERS = MappingProxyType(
@@ -47,7 +49,6 @@ TANGENT_ORDERS = MappingProxyType(
 QUATERNION_ORDERS = MappingProxyType(
     {"scipy": "xyzw", "jaxlie": "wxyz", "pinocchio": "xyzw", "gtsam": "wxyz", "sophus": "xyzw", "manif": "xyzw"}
 )
-_ORDERS = {"wxyz": (0, 1, 2, 3), "xyzw": (3, 0, 1, 2)}
 
 
 def tangent_to(library: str, group: GroupLike, x: ArrayLike) -> Array:
@@ -117,19 +118,13 @@ def rotation_from_quaternion(q: ArrayLike, *, order: str | None = None) -> Array
         InputError: no order or another, or a zero quaternion.
         ShapeError: the last axis is not 4.
     """
-    values = np.asarray(q, dtype=float)
-    if values.ndim < 1 or values.shape[-1] != 4:
-        raise ShapeError(f"q has shape {values.shape}; its last axis must be 4")
-    w, x, y, z = np.moveaxis(values[..., _quaternion_order(order)], -1, 0)
-    square = w * w + x * x + y * y + z * z
+    values = shaped(q, (..., 4), "q")
+    places = quaternion_order(order)
+    square = np.sum(values * values, axis=-1)
     if not np.all((square > 0) & np.isfinite(square)):
         raise InputError("q is zero or not finite: it stands for no rotation")
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.stack([np.stack([entry / square for entry in row], axis=-1) for row in rows], axis=-2)
+    rows = rotation_entries(list(np.moveaxis(values, -1, 0)), places)
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array:
@@ -150,7 +145,7 @@ def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array
     matrix = np.asarray(R, dtype=float)
     if matrix.shape[-2:] != (3, 3):
         raise ShapeError(f"R has shape {matrix.shape}; its last axes must be (3, 3)")
-    places = _quaternion_order(order)
+    places = quaternion_order(order)
     off = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
     if not (off <= NEAR_GROUP and np.all(np.linalg.det(matrix) > 0)):
         raise NotOnGroupError(f"R is not a rotation: |R R^T - I| is {off:.3g}, or det R < 0")
@@ -168,15 +163,6 @@ def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array
     q = np.take_along_axis(np.moveaxis(table, (0, 1), (-2, -1)), largest[..., None, None], axis=-2)[..., 0, :]
     q = np.where(q[..., :1] < 0, -q, q) / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.asarray(q[..., np.argsort(places)])
-
-
-def _quaternion_order(order: str | None) -> tuple[int, ...]:
-    if order is None:
-        raise InputError("the quaternion order is not given: order='wxyz' (scalar first) or order='xyzw' (scalar last)")
-    order = {"scalar_first": "wxyz", "scalar_last": "xyzw"}.get(order, order)
-    if order not in _ORDERS:
-        raise InputError(f"quaternion order {order!r} is neither 'wxyz' nor 'xyzw'")
-    return _ORDERS[order]
 
 
 def _permutation(library: str, group: MatrixGroup) -> list[int]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import InputError, MissingDependencyError, write_refusal
+from lie_codegen.errors import InputError, write_refusal
 from lie_codegen.pictures.dark import dark
-from lie_codegen.pictures.style import style
+from lie_codegen.pictures.style import require_matplotlib, style
 from lie_codegen.whole_files import whole_file, write_whole
 
 #: How a figure is drawn: on white, or on the dark page.
@@ -97,10 +97,7 @@ def new_figure(width: float, height: float) -> Any:
     Raises:
         MissingDependencyError: without matplotlib.
     """
-    try:
-        from lie_codegen.pictures.shown_figure import ShownFigure
-    except ImportError:
-        raise MissingDependencyError(
-            "pictures need matplotlib: install lie_codegen with its extra, lie_codegen[plot]"
-        ) from None
+    require_matplotlib()
+    from lie_codegen.pictures.shown_figure import ShownFigure
+
     return ShownFigure(figsize=(width, height), layout="constrained")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import AbstractContextManager
+from importlib import import_module
 from typing import Any
 
 from lie_codegen.errors import MissingDependencyError
@@ -32,19 +33,30 @@ _SETTINGS: dict[str, Any] = {
 }
 
 
+def require_matplotlib() -> None:
+    """Say which extra is missing, where matplotlib is.
+
+    Raises:
+        MissingDependencyError: it cannot be imported.
+    """
+    try:
+        import_module("matplotlib")
+    except ImportError:
+        raise MissingDependencyError(
+            "pictures need matplotlib: install lie_codegen with its extra, lie_codegen[plot]"
+        ) from None
+
+
 def style() -> AbstractContextManager[None]:
     """Figures made inside follow the style; the caller's own matplotlib settings are as before after it.
 
     Raises:
         MissingDependencyError: without matplotlib.
     """
-    try:
-        from matplotlib import rc_context
-        from matplotlib.rcsetup import cycler
-    except ImportError:
-        raise MissingDependencyError(
-            "pictures need matplotlib: install lie_codegen with its extra, lie_codegen[plot]"
-        ) from None
+    require_matplotlib()
+    from matplotlib import rc_context
+    from matplotlib.rcsetup import cycler
+
     context: AbstractContextManager[None] = rc_context({**_SETTINGS, "axes.prop_cycle": cycler(color=COLOURS)})
     return context
 

@@ -16,7 +16,8 @@ from lie_codegen.control.attitude import attitude_linearisation, attitude_region
 from lie_codegen.control.attitude_law import attitude_law
 from lie_codegen.control.attitude_lyapunov import attitude_lyapunov
 from lie_codegen.errors import InertiaWarning, InputError
-from lie_codegen.groups.maps.quaternion import rotation_from_quaternion, with_quaternion
+from lie_codegen.groups.conventions import rotation_from_quaternion
+from lie_codegen.groups.maps.quaternion import with_quaternion
 from lie_codegen.groups.maps.rotation_log import rotation_log
 from lie_codegen.kernel.casadi_arithmetic import function_of
 from lie_codegen.kernel.dual import decimal_arithmetic

@@ -14,19 +14,14 @@ from lie_codegen.runtime.call import Compiled
 def torch_function(function: Kernel | Compiled[Any]) -> Callable[..., Any]:
     """The kernel as a function of tensors: a `torch.autograd.Function` with backward, jvp and vmap, to any order.
 
-    The values come from the compiled C, the derivatives from its derivative kernels, exact and compiled when first asked for.
-    Arguments have the shapes of the ports, with any leading axes, which broadcast. Computed in double on the host; the
-    result has the type of the arguments and the device of the first. Gradients of complex tensors are PyTorch's: d/dRe + i d/dIm.
+    What `jax_function` is for JAX; computed in double on the host. The result has the type of the arguments and the device of the
+    first. Gradients of complex tensors are PyTorch's: d/dRe + i d/dIm.
 
     Args:
-        function: a Kernel, or a compiled function such as `lc.build("so3").exp`.
-
-    Returns:
-        a function of the inputs, in order or by name, that gives the output, or a named tuple of several.
+        function: as there, and so is what is returned.
 
     Raises:
-        InputError: what is given is neither; an input is missing.
-        ShapeError: an argument has other last axes than its port.
+        InputError, ShapeError: as there.
         MissingDependencyError: torch is not installed (extra "torch").
     """
     kernel = kernel_of(function, "torch_function")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -85,7 +86,12 @@ def _compound(data: GroupDerivation, order: int) -> Kernel:
             shift[k] = shift[k] + number(ops, c) * weight
         return product_of_both, total, scaled(ops.constant(-1) / 24, shift)
 
-    inputs = (_element(data, "X1"), _square(n, "S1"), _element(data, "X2"), _square(n, "S2"))
+    inputs = (
+        _given_element(data, "X1"),
+        _given_covariance(n, "S1"),
+        _given_element(data, "X2"),
+        _given_covariance(n, "S2"),
+    )
     outputs = (_element(data, "X"), _square(n, "S"), Port("mean_shift", (n,)))
     formula = f"X1 exp(hat a) X2 exp(hat b), a ~ (0, S1), b ~ (0, S2): element, covariance and mean to order {order}"
     return _kernel(data, "compound", inputs, outputs, body, formula, _COVARIANCE)
@@ -100,7 +106,10 @@ def _inverse(data: GroupDerivation) -> Kernel:
         inverse = matrices.inverse(element)
         return matrices.write(inverse), _transported(_adjoint(matrices, element, inverse), S)
 
-    inputs, outputs = (_element(data, "X"), _square(n, "S")), (_element(data, "Y"), _square(n, "S_inverse"))
+    inputs, outputs = (
+        (_given_element(data, "X"), _given_covariance(n, "S")),
+        (_element(data, "Y"), _square(n, "S_inverse")),
+    )
     return _kernel(
         data, "inverse_covariance", inputs, outputs, body, "Y = X^-1, S_inverse = Ad_X S Ad_X^T", _COVARIANCE
     )
@@ -130,11 +139,13 @@ def _flow(data: GroupDerivation) -> Kernel:
         return matrices.write(end), matadd(_transported(F, S), added)
 
     inputs = (
-        _element(data, "X"),
-        _square(n, "S"),
-        Port("u", (n,), description="constant body velocity"),
-        Port("duration", ()),
-        _square(n, "Q"),
+        _given_element(data, "X"),
+        _given_covariance(n, "S"),
+        _Given(
+            Port("u", (n,), description="constant body velocity"), lambda rng: [rng.uniform(-1, 1) for _ in range(n)]
+        ),
+        _Given(Port("duration", ()), lambda rng: rng.uniform(0, 1)),
+        _given_covariance(n, "Q"),
     )
     outputs = (_element(data, "Y"), _square(n, "S_end"))
     formula = "S' = -ad_u S - S ad_u^T + Q over the duration; to rounding for |ad_u| duration up to 16"
@@ -147,7 +158,7 @@ def _mean_term(data: GroupDerivation) -> Kernel:
     def body(ops: Arithmetic, X: Any, Z: Any) -> tuple[Any, ...]:
         return (_relative_log(ops, data, X, Z),)
 
-    inputs, outputs = (_element(data, "X"), _element(data, "Z")), (Port("e", (n,)),)
+    inputs, outputs = (_given_element(data, "X"), _given_element(data, "Z")), (Port("e", (n,)),)
     return _kernel(data, "mean_term", inputs, outputs, body, "e = log(X^-1 Z)", _BARYCENTRE)
 
 
@@ -160,7 +171,7 @@ def _fuse_term(data: GroupDerivation) -> Kernel:
         weighted = matmul(transpose(J), information)
         return matvec(weighted, e), matmul(weighted, J)
 
-    inputs = (_element(data, "X"), _element(data, "Z"), _square(n, "information"))
+    inputs = (_given_element(data, "X"), _given_element(data, "Z"), _given_covariance(n, "information"))
     outputs = (Port("slope", (n,)), _square(n, "normal"))
     formula = "slope = J^T W e, normal = J^T W J with e = log(Z^-1 X), J = rjac_inv(e), W = S^-1: a Gauss-Newton step is -normal^-1 slope"
     return _kernel(data, "fuse_term", inputs, outputs, body, formula, "Gauss-Newton for the most probable element")
@@ -224,27 +235,38 @@ def _square(n: int, name: str) -> Port:
     return Port(name, (n, n))
 
 
+@dataclass(frozen=True)
+class _Given:
+    """An input, and what draws an admissible value of it."""
+
+    port: Port
+    draw: Callable[[random.Random], Any]
+
+
+def _given_element(data: GroupDerivation, name: str) -> _Given:
+    return _Given(_element(data, name), lambda rng: group_kernel(data.group, "log").sample(rng)[0])
+
+
+def _given_covariance(n: int, name: str) -> _Given:
+    def positive(rng: random.Random) -> Matrix:
+        root = [[rng.uniform(-0.2, 0.2) for _ in range(n)] for _ in range(n)]
+        return matmul(root, transpose(root))
+
+    return _Given(_square(n, name), positive)
+
+
 def _kernel(
     data: GroupDerivation,
     name: str,
-    inputs: Sequence[Port],
+    inputs: Sequence[_Given],
     outputs: Sequence[Port],
     body: Callable[..., tuple[Any, ...]],
     formula: str,
     source: str,
 ) -> Kernel:
-    def sample(rng: random.Random) -> tuple[Any, ...]:
-        return tuple(_draw(data, port, rng) for port in inputs)
+    ports = tuple(each.port for each in inputs)
 
-    return Kernel(name, data.group.name, tuple(inputs), tuple(outputs), body, formula, source, sample)
+    def sampler(rng: random.Random) -> tuple[Any, ...]:
+        return tuple(each.draw(rng) for each in inputs)
 
-
-def _draw(data: GroupDerivation, port: Port, rng: random.Random) -> Any:
-    """An element, a positive matrix, a velocity, a duration."""
-    n = data.group.dim
-    if port.name in ("X", "X1", "X2", "Z"):
-        return group_kernel(data.group, "log").sample(rng)[0]
-    if port.shape == (n, n):
-        root = [[rng.uniform(-0.2, 0.2) for _ in range(n)] for _ in range(n)]
-        return matmul(root, transpose(root))
-    return [rng.uniform(-1, 1) for _ in range(n)] if port.shape else rng.uniform(0, 1)
+    return Kernel(name, data.group.name, ports, tuple(outputs), body, formula, source, sampler)

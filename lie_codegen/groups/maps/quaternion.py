@@ -13,13 +13,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import kernel_factory
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.linear import Matrix, Vector
+from lie_codegen.kernel.linear import Matrix
 
 #: Orders of the entries by name.
 ORDERS = {"scalar_first": (0, 1, 2, 3), "scalar_last": (3, 0, 1, 2)}
@@ -96,23 +95,6 @@ def with_quaternion(law: Kernel, *, order: str | None = None, name: str | None =
         sampler=sampler,
         formula=f"{law.formula}; attitude as a quaternion {words}",
     )
-
-
-def rotation_from_quaternion(q: ArrayLike, *, order: str | None = None) -> NDArray[np.float64]:
-    """(..., 3, 3) rotations from (..., 4) quaternions of any length but zero.
-
-    Raises:
-        InputError: the order is not given, or a quaternion is zero.
-        ShapeError: the last axis is not 4.
-    """
-    places = quaternion_order(order)
-    values = np.asarray(q, dtype=float)
-    if values.shape[-1:] != (4,):
-        raise ShapeError(f"quaternions have four entries, got shape {values.shape}")
-    if np.any(np.linalg.norm(values, axis=-1) == 0) or not np.all(np.isfinite(values)):
-        raise InputError("a quaternion is zero or not finite")
-    rows: Vector = rotation_entries([values[..., k] for k in range(4)], places)
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _unit(rng: random.Random) -> list[float]:
