@@ -10,6 +10,7 @@
  * ROWS (all basis matrices vanish below), SKEW (they are skew-Hermitian), COORDINATES (brackets from structure
  * constants, else as matrices), QUATERNION; and hat(), lie_bracket(), quaternion_matrix().
  */
+#define HALVES 1 /* of skew-Hermitian matrices what lies above the diagonal is enough here */
 #include "magnus_words.h"
 
 /* One step of every lane; keeps the largest squared |a_1|. */
@@ -22,7 +23,12 @@ static __attribute__((noinline)) void step(const Input *u, Source *source, int o
 #define IN_WORK a
 #else
     V work[ORDERS][MATRIX];
-    EACH(j, ORDERS) { hat(a[j], work[j]); }
+    EACH(j, ORDERS) { hat_work(a[j], work[j]); }
+#if ABOVE
+    EACH(j, 2) { /* brackets read these two */
+        EACH_ABOVE(k) { SET_SKEW(work[j], work[j][k]); }
+    }
+#endif
 #define IN_WORK work
 #endif
     if (order == 8) {

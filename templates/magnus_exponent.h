@@ -28,7 +28,7 @@ static inline void entry(const V *x, const V *y, V *z, int i, int j)
 
 #if MATRIX > 32 && PARTS == 2
 /* Four entries at once, two rows by two columns: what is loaded is used twice, and eight sums do not wait for each other. */
-static inline void four_entries(const V *x, const V *y, V *z, int i, int j)
+static inline void four_entries(const V *x, const V *y, int i, int j, V block[8])
 {
     const V *const p = x + i * SIZE, *const q = p + SIZE;
     V re00 = splat(0.0), re01 = re00, re10 = re00, re11 = re00, im00 = re00, im01 = re00, im10 = re00, im11 = re00;
@@ -53,16 +53,20 @@ static inline void four_entries(const V *x, const V *y, V *z, int i, int j)
         im10 += bi * c;
         im11 += bi * d;
     }
-    z += i * SIZE + j;
-    z[0] = re00;
-    z[1] = re01;
-    z[SIZE] = re10;
-    z[SIZE + 1] = re11;
-    z += MATRIX / 2;
-    z[0] = im00;
-    z[1] = im01;
-    z[SIZE] = im10;
-    z[SIZE + 1] = im11;
+    block[0] = re00;
+    block[1] = re01;
+    block[2] = re10;
+    block[3] = re11;
+    block[4] = im00;
+    block[5] = im01;
+    block[6] = im10;
+    block[7] = im11;
+}
+
+/* Where an entry of such a block lies in the matrix. */
+static inline int place_of(int k, int i, int j)
+{
+    return (k / 4) * (MATRIX / 2) + (i + k / 2 % 2) * SIZE + j + k % 2;
 }
 
 /* z = x y. */
@@ -70,7 +74,9 @@ static __attribute__((noinline)) void multiply(const V *x, const V *y, V *z)
 {
     for (int i = 0; i + 1 < ROWS; i += 2) {
         for (int j = 0; j + 1 < SIZE; j += 2) {
-            four_entries(x, y, z, i, j);
+            V block[8];
+            four_entries(x, y, i, j, block);
+            EACH(k, 8) { z[place_of(k, i, j)] = block[k]; }
         }
         if (SIZE % 2) {
             entry(x, y, z, i, SIZE - 1);
@@ -94,15 +100,95 @@ static void multiply(const V *x, const V *y, V *z)
 }
 #endif
 
+#if SKEW
+/*
+ * The entries k on and above the diagonal of both parts, and those across it, `mirror`: of Hermitian and of skew-Hermitian matrices the
+ * former are enough. A whole matrix has twice as many, and what moves them, not what computes, takes the time.
+ */
+#define EACH_ABOVE(k) \
+    EACH(part, PARTS) EACH(row, SIZE) \
+        for (int k = part * (MATRIX / 2) + row * (SIZE + 1), mirror = k; k < part * (MATRIX / 2) + (row + 1) * SIZE; ++k, mirror += SIZE)
+#define SET_HERMITIAN(x, value) ((x)[mirror] = (1.0 - 2.0 * part) * ((x)[k] = (value)))
+#define SET_SKEW(x, value) ((x)[mirror] = (2.0 * part - 1.0) * ((x)[k] = (value)))
+
+/* z = x y where x and y commute and each is Hermitian or skew-Hermitian; then so is z, sign being 1 or -1, and half of it is computed. */
+#if MATRIX > 16
+static __attribute__((noinline))
+#else
+static inline
+#endif
+void half_product(const V *x, const V *y, V *z, double sign)
+{
+#if MATRIX > 32 && PARTS == 2
+    for (int i = 0; i + 1 < SIZE; i += 2) {
+        for (int j = i; j + 1 < SIZE; j += 2) {
+            V block[8];
+            four_entries(x, y, i, j, block);
+            EACH(k, 8) { z[place_of(k, i, j)] = block[k]; }
+        }
+    }
+    if (SIZE % 2) {
+        EACH(i, SIZE) { entry(x, y, z, i, SIZE - 1); }
+    }
+#else
+    EACH(i, SIZE) {
+        for (int j = i; j < SIZE; ++j) { entry(x, y, z, i, j); }
+    }
+#endif
+    EACH(i, SIZE) {
+        EACH(j, i) {
+            z[i * SIZE + j] = sign * z[j * SIZE + i];
+#if PARTS == 2
+            z[MATRIX / 2 + i * SIZE + j] = -sign * z[MATRIX / 2 + j * SIZE + i];
+#endif
+        }
+    }
+}
+#endif
+
+/* ABOVE: of elements of the algebra the entries above the diagonal are kept, and the others where a bracket is to read them. */
+#define ABOVE (SKEW && !COORDINATES && HALVES)
+#if ABOVE
+#define EACH_WORK(k) EACH_ABOVE(k)
+#define hat_work hat_above
+#define SET_WORK(x, value) SET_SKEW(x, value)
+#else
+#define EACH_WORK(k) EACH(k, WORK)
+#define hat_work hat
+#define SET_WORK(x, value) ((x)[k] = (value))
+#endif
+
 #if !COORDINATES
 /* [x, y]; of skew-Hermitian matrices y x = (x y)^H, so that one product is enough. */
-static void matrix_bracket(const V *x, const V *y, V *z)
+#if MATRIX > 32
+static __attribute__((noinline))
+#else
+static
+#endif
+void matrix_bracket(const V *x, const V *y, V *z)
 {
+#if ABOVE && MATRIX > 32 && PARTS == 2 && SIZE % 2 == 0
+    for (int i = 0; i < SIZE; i += 2) {
+        for (int j = i; j < SIZE; j += 2) {
+            V block[8], across[8];
+            four_entries(x, y, i, j, block);
+            if (j > i) {
+                four_entries(x, y, j, i, across);
+            } else {
+                EACH(k, 8) { across[k] = block[k]; }
+            }
+            EACH(k, 4) { /* entry (r, s) of the block less the conjugate of (s, r) across */
+                const int turned = k % 2 * 2 + k / 2;
+                z[place_of(k, i, j)] = block[k] - across[turned];
+                z[place_of(4 + k, i, j)] = block[4 + k] + across[4 + turned];
+            }
+        }
+    }
+#elif SKEW
     V xy[MATRIX];
     multiply(x, y, xy);
-#if SKEW
     EACH(i, SIZE) {
-        EACH(j, SIZE) {
+        for (int j = ABOVE ? i : 0; j < SIZE; ++j) {
             z[i * SIZE + j] = xy[i * SIZE + j] - xy[j * SIZE + i];
 #if PARTS == 2
             z[MATRIX / 2 + i * SIZE + j] = xy[MATRIX / 2 + i * SIZE + j] + xy[MATRIX / 2 + j * SIZE + i];
@@ -110,7 +196,8 @@ static void matrix_bracket(const V *x, const V *y, V *z)
         }
     }
 #else
-    V yx[MATRIX];
+    V xy[MATRIX], yx[MATRIX];
+    multiply(x, y, xy);
     multiply(y, x, yx);
     EACH(i, MATRIX) { z[i] = xy[i] - yx[i]; }
 #endif
@@ -123,8 +210,10 @@ static void matrix_bracket(const V *x, const V *y, V *z)
 /* ---- the exponent: brackets have the sign of X' = X A, c(a, b) = -[a, b] ---- */
 
 /* Intermediate values that the derivative needs again. */
+/* Intermediate values that the derivative needs again. */
+enum { KEPT = WORK + APART };
 typedef struct {
-    V x1[WORK], y1[WORK], s1[WORK], w1[WORK], r1[WORK], x2[WORK], y2[WORK], s2[WORK], t2[WORK], x3[WORK], y3[WORK], r2[WORK], x4[WORK], y4[WORK];
+    V x1[KEPT], y1[KEPT], s1[KEPT], w1[KEPT], r1[KEPT], x2[KEPT], y2[KEPT], s2[KEPT], t2[KEPT], x3[KEPT], y3[KEPT], r2[KEPT], x4[KEPT], y4[KEPT];
 } Stages;
 
 /* Blanes, Casas and Ros, BIT 40 (2000) 434. */
@@ -133,62 +222,62 @@ __attribute__((noinline))
 #endif
 static void exponent8(const V a[ORDERS][WORK], Stages *st, V *omega)
 {
-    V s3[WORK];
-    EACH(k, WORK) {
-        st->x1[k] = a[0][k] + a[2][k] * (1.0 / 28);
-        st->y1[k] = a[1][k] + a[3][k] * (3.0 / 28);
+    V s3[KEPT];
+    EACH_WORK(k) {
+        SET_WORK(st->x1, a[0][k] + a[2][k] * (1.0 / 28));
+        SET_WORK(st->y1, a[1][k] + a[3][k] * (3.0 / 28));
     }
     BRACKET(st->x1, st->y1, st->s1);
-    EACH(k, WORK) {
-        st->s1[k] *= 1.0 / 28;
-        st->w1[k] = st->s1[k] - a[2][k] * (1.0 / 14);
+    EACH_WORK(k) {
+        SET_WORK(st->s1, st->s1[k] * (1.0 / 28));
+        SET_WORK(st->w1, st->s1[k] - a[2][k] * (1.0 / 14));
     }
     BRACKET(a[0], st->w1, st->r1);
-    EACH(k, WORK) {
+    EACH_WORK(k) {
         st->r1[k] *= -1.0 / 3;
-        st->x2[k] = st->x1[k] + st->s1[k];
-        st->y2[k] = st->y1[k] + st->r1[k];
+        SET_WORK(st->x2, st->x1[k] + st->s1[k]);
+        SET_WORK(st->y2, st->y1[k] + st->r1[k]);
     }
     BRACKET(st->x2, st->y2, st->s2);
     BRACKET(a[1], st->s1, st->t2);
-    EACH(k, WORK) {
+    EACH_WORK(k) {
         st->s2[k] = -st->s2[k];
         st->t2[k] = -st->t2[k];
-        st->x3[k] = a[0][k] + 1.25 * st->s1[k];
-        st->y3[k] = 2.0 * a[2][k] + st->s2[k] + 0.5 * st->t2[k];
+        SET_WORK(st->x3, a[0][k] + 1.25 * st->s1[k]);
+        SET_WORK(st->y3, 2.0 * a[2][k] + st->s2[k] + 0.5 * st->t2[k]);
     }
     BRACKET(st->x3, st->y3, st->r2);
-    EACH(k, WORK) {
+    EACH_WORK(k) {
         st->r2[k] = -st->r2[k];
-        st->x4[k] = a[0][k] + a[2][k] * (1.0 / 12) - st->s1[k] * (7.0 / 3) - st->s2[k] * (1.0 / 6);
-        st->y4[k] = -9.0 * a[1][k] - 2.25 * a[3][k] + 63.0 * st->r1[k] + st->r2[k];
+        SET_WORK(st->x4, a[0][k] + a[2][k] * (1.0 / 12) - st->s1[k] * (7.0 / 3) - st->s2[k] * (1.0 / 6));
+        SET_WORK(st->y4, -9.0 * a[1][k] - 2.25 * a[3][k] + 63.0 * st->r1[k] + st->r2[k]);
     }
     BRACKET(st->x4, st->y4, s3);
-    EACH(k, WORK) { omega[k] = (a[0][k] + a[2][k] * (1.0 / 12)) - st->s2[k] * (7.0 / 120) - s3[k] * (1.0 / 360); }
+    EACH_WORK(k) { SET_WORK(omega, (a[0][k] + a[2][k] * (1.0 / 12)) - st->s2[k] * (7.0 / 120) - s3[k] * (1.0 / 360)); }
 }
 
 /* From moments of four orders, a_2 of three is a_2 + 3 a_4 / 20. */
 static inline void exponent6(const V a[ORDERS][WORK], V *omega)
 {
-    V b[WORK], first[WORK], x[WORK], second[WORK];
-    EACH(k, WORK) { b[k] = a[1][k] + 0.15 * a[3][k]; }
+    V b[KEPT], first[KEPT], x[KEPT], second[KEPT];
+    EACH_WORK(k) { SET_WORK(b, a[1][k] + 0.15 * a[3][k]); }
     BRACKET(a[0], b, first);
-    EACH(k, WORK) { x[k] = 2.0 * a[2][k] - first[k]; }
+    EACH_WORK(k) { SET_WORK(x, 2.0 * a[2][k] - first[k]); }
     BRACKET(a[0], x, second);
-    EACH(k, WORK) {
-        x[k] = -20.0 * a[0][k] - a[2][k] - first[k];
-        b[k] += second[k] * (1.0 / 60);
+    EACH_WORK(k) {
+        SET_WORK(x, -20.0 * a[0][k] - a[2][k] - first[k]);
+        SET_WORK(b, b[k] + second[k] * (1.0 / 60));
     }
     BRACKET(x, b, second);
-    EACH(k, WORK) { omega[k] = (a[0][k] + a[2][k] * (1.0 / 12)) - second[k] * (1.0 / 240); }
+    EACH_WORK(k) { SET_WORK(omega, (a[0][k] + a[2][k] * (1.0 / 12)) - second[k] * (1.0 / 240)); }
 }
 
 static inline void exponent4(const V a[ORDERS][WORK], V *omega)
 {
-    V b[WORK], first[WORK];
-    EACH(k, WORK) { b[k] = a[1][k] + 0.15 * a[3][k]; }
+    V b[KEPT], first[KEPT];
+    EACH_WORK(k) { SET_WORK(b, a[1][k] + 0.15 * a[3][k]); }
     BRACKET(a[0], b, first);
-    EACH(k, WORK) { omega[k] = (a[0][k] + a[2][k] * (1.0 / 12)) + first[k] * (1.0 / 12); }
+    EACH_WORK(k) { SET_WORK(omega, (a[0][k] + a[2][k] * (1.0 / 12)) + first[k] * (1.0 / 12)); }
 }
 
 #endif

@@ -4,7 +4,7 @@
 
 #if QUATERNION
 /* q (dq - 1) is added; cos - 1 and sin / x in even powers of the half angle, no root and no division. */
-static inline void move(const V *omega, V *q)
+static inline void move(V *omega, V *q)
 {
     const V x = omega[0] * HALF, y = omega[1] * HALF, z = omega[2] * HALF;
     V r = x * x + y * y + z * z, scale = splat(1.0);
@@ -29,25 +29,77 @@ static inline void move(const V *omega, V *q)
     q[3] += qz * c + (q0 * vz + (qx * vy - qy * vx));
 }
 #else
-static const double inverse_factorial[19] = {1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040,
+static const double inverse_factorial[22] = {1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040,
     1.0 / 40320, 1.0 / 362880, 1.0 / 3628800, 1.0 / 39916800, 1.0 / 479001600, 1.0 / 6227020800.0, 1.0 / 87178291200.0,
-    1.0 / 1307674368000.0, 1.0 / 20922789888000.0, 1.0 / 355687428096000.0, 1.0 / 6402373705728000.0};
+    1.0 / 1307674368000.0, 1.0 / 20922789888000.0, 1.0 / 355687428096000.0, 1.0 / 6402373705728000.0,
+    1.0 / 121645100408832000.0, 1.0 / 2432902008176640000.0, 1.0 / 51090942171709440000.0};
 
-/* d = exp(A) - 1: Taylor of degree 6, 9, 12, 15 or 18 by Paterson and Stockmeyer in powers of A^3, halved and squared beyond. */
-static void increment(V *A, V *d)
+/* A scaled by a power of 2 so that its norm, which is returned, is at most `most`; how often it was halved. */
+static double halve(V *A, double most, int *halvings)
 {
-    V square[MATRIX], cube[MATRIX], next[MATRIX], norm = splat(0.0);
-    int halvings = 0, degree;
+    V norm = splat(0.0);
     EACH(k, MATRIX) { norm += A[k] * A[k]; }
     double size = sqrt(largest(norm));
-    for (; size > 1.0 && halvings < 60; size *= 0.5) {
-        ++halvings;
+    for (*halvings = 0; size > most && *halvings < 60; size *= 0.5) {
+        ++*halvings;
     }
-    if (halvings) {
-        EACH(k, MATRIX) { A[k] *= ldexp(1.0, -halvings); }
+    if (*halvings) {
+        EACH(k, MATRIX) { A[k] *= ldexp(1.0, -*halvings); }
     }
+    return size;
+}
+
+#if SKEW
+/*
+ * d = exp(A) - 1 = (cosh A - 1) + sinh A, Hermitian and skew-Hermitian: polynomials of degree 2 m in S = A^2, the second times A, by Paterson
+ * and Stockmeyer in powers of S^m. All that is multiplied commutes, so that of every product half is enough.
+ */
+static void exponential_less_one(V *A, double size, V *d)
+{
+    /* size^(4 m + 2) / (4 m + 2)! below 1e-17 */
+    const int m = size <= 0.0044 ? 1 : size <= 0.09 ? 2 : size <= 0.36 ? 3 : size <= 0.85 ? 4 : 5;
+    const double *const even = inverse_factorial, *const odd = inverse_factorial + 1;
+    enum { ROOM = MATRIX + APART };
+    V power[6][ROOM], cosh[ROOM], sinh[ROOM], high[ROOM];
+    half_product(A, A, power[1], 1.0);
+    for (int p = 2; p <= m; ++p) {
+        half_product(power[p / 2], power[p - p / 2], power[p], 1.0);
+    }
+    EACH_ABOVE(k) {
+        V c = even[2 * (m + 1)] * power[1][k], s = odd[2 * (m + 1)] * power[1][k];
+        for (int p = 2; p <= m; ++p) {
+            c += even[2 * (m + p)] * power[p][k];
+            s += odd[2 * (m + p)] * power[p][k];
+        }
+        SET_HERMITIAN(cosh, c);
+        SET_HERMITIAN(sinh, s);
+    }
+    half_product(power[m], cosh, high, 1.0);
+    half_product(power[m], sinh, d, 1.0);
+    EACH_ABOVE(k) {
+        V c = high[k], s = d[k];
+        for (int p = m; p > 0; --p) { /* the largest last */
+            c += even[2 * p] * power[p][k];
+            s += odd[2 * p] * power[p][k];
+        }
+        cosh[k] = c;
+        SET_HERMITIAN(sinh, s);
+    }
+    half_product(A, sinh, high, -1.0);
+    EACH_ABOVE(k) {
+        const V s = A[k] + high[k];
+        d[k] = cosh[k] + s;
+        d[mirror] = (1.0 - 2.0 * part) * (cosh[k] - s);
+    }
+}
+#define MOST_SIZE 1.5
+#else
+/* d = exp(A) - 1: Taylor of degree 6, 9, 12, 15 or 18 by Paterson and Stockmeyer in powers of A^3. */
+static void exponential_less_one(V *A, double size, V *d)
+{
+    V square[MATRIX], cube[MATRIX], next[MATRIX];
     /* size^degree / (degree + 1)! below 1e-17 */
-    degree = size <= 0.006 ? 6 : size <= 0.07 ? 9 : size <= 0.24 ? 12 : size <= 0.56 ? 15 : 18;
+    const int degree = size <= 0.006 ? 6 : size <= 0.07 ? 9 : size <= 0.24 ? 12 : size <= 0.56 ? 15 : 18;
     multiply(A, A, square);
     multiply(square, A, cube);
     EACH(k, MATRIX) {
@@ -60,21 +112,33 @@ static void increment(V *A, V *d)
                 + (inverse_factorial[low + 2] * cube[k] + next[k]));
         }
     }
+}
+#define MOST_SIZE 1.0
+#endif
+
+/* d = exp(A) - 1, of A halved until it is small, squared again. */
+static void increment(V *A, V *d)
+{
+    int halvings;
+    const double size = halve(A, MOST_SIZE, &halvings);
+    exponential_less_one(A, size, d);
     for (; halvings; --halvings) { /* (1 + d)^2 - 1 */
+        V next[MATRIX];
         multiply(d, d, next);
         EACH(k, MATRIX) { d[k] = 2.0 * d[k] + next[k]; }
     }
 }
 
-static inline void move(const V *omega, V *X)
+static inline void move(V *omega, V *X)
 {
-    V A[MATRIX], d[MATRIX], Xd[MATRIX];
+    V d[MATRIX + APART], Xd[MATRIX];
 #if COORDINATES
+    V A[MATRIX];
     hat(omega, A);
-#else
-    EACH(k, MATRIX) { A[k] = omega[k]; }
-#endif
     increment(A, d);
+#else
+    increment(omega, d);
+#endif
     multiply(X, d, Xd);
     EACH(k, MATRIX) { X[k] += Xd[k]; }
 }

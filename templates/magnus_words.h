@@ -12,6 +12,9 @@
 #define EXPORT
 #endif
 
+#ifndef HALVES
+#define HALVES 0 /* of skew-Hermitian matrices whole ones are kept */
+#endif
 #define MATRIX (PARTS * ROWS * SIZE)
 #define FULL (PARTS * SIZE * SIZE)
 #if COORDINATES
@@ -19,6 +22,8 @@
 #else
 #define WORK MATRIX
 #endif
+/* Matrices of 4 KiB and multiples of it would lie in the same sets of the cache: so many vectors more keep them apart. */
+#define APART (MATRIX % 64 == 0 ? 5 : 0)
 #if QUATERNION
 #define STATE 4
 #else
