@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -46,6 +47,25 @@ def call_group(group: MatrixGroup, kernel_name: str, *arguments: Any) -> np.ndar
     k = group_kernel(group, kernel_name)
     flat = [flatten(port, value) for port, value in zip(k.inputs, arguments, strict=True)]
     return unflatten(k.outputs[0], np.array(function_of_group(group, kernel_name)(*flat)))
+
+
+def interpreted(kernel: Kernel) -> Callable[..., list[np.ndarray]]:
+    """The kernel by the CasADi interpreter, called thousands of times: arrays in, flat outputs out, through buffers that are laid once."""
+    function = function_of(kernel)
+    given, made = ([np.zeros(port.size) for port in ports] for ports in (kernel.inputs, kernel.outputs))
+    buffer, evaluate = function.buffer()
+    for place, array in enumerate(given):
+        buffer.set_arg(place, memoryview(array))
+    for place, array in enumerate(made):
+        buffer.set_res(place, memoryview(array))
+
+    def call(*arguments: Any, kept: Any = (function, buffer)) -> list[np.ndarray]:
+        for array, value in zip(given, arguments, strict=True):
+            array[:] = np.ravel(value)
+        evaluate()
+        return [array.copy() for array in made]
+
+    return call
 
 
 def flatten(port: Port, value: Any) -> np.ndarray:

@@ -8,6 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from kernel_calls import interpreted
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
@@ -19,7 +20,6 @@ from lie_codegen.errors import InertiaWarning, InputError
 from lie_codegen.groups.conventions import rotation_from_quaternion
 from lie_codegen.groups.maps.quaternion import with_quaternion
 from lie_codegen.groups.maps.rotation_log import rotation_log
-from lie_codegen.kernel.casadi_arithmetic import function_of
 from lie_codegen.kernel.dual import decimal_arithmetic
 
 J = np.diag([6.0, 3, 1])
@@ -28,11 +28,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::lie_codegen.errors.InertiaWarni
 
 def hat(w: np.ndarray) -> np.ndarray:
     return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-
-
-def caller(kernel):
-    function = function_of(kernel)
-    return lambda *a: [np.array(v).ravel() for v in function(*(np.ravel(x) for x in a))]
 
 
 def closed_loop(law, inertia, R, w, t, **options):
@@ -46,7 +41,7 @@ def closed_loop(law, inertia, R, w, t, **options):
 
 
 def test_published_trajectory_of_the_second_order_law() -> None:
-    law = caller(attitude_law("pd", inertia=J, k_p=4, k_d=6, gyroscopic="cancel"))
+    law = interpreted(attitude_law("pd", inertia=J, k_p=4, k_d=6, gyroscopic="cancel"))
     run = closed_loop(law, J, expm(hat(np.array([1.2, -0.8, 1]))), np.array([0.3, -0.4, 0.5]), 10)
     R, w = run.y[:9, -1].reshape(3, 3), run.y[9:, -1]
     theta = Rotation.from_matrix(R).as_rotvec()
@@ -63,7 +58,7 @@ def test_published_eigenvalues_of_the_linearisation() -> None:
 
 @pytest.mark.parametrize("gyroscopic", ["cancel", "none", "double"])
 def test_lyapunov_rate_is_minus_kd_omega_squared_for_every_variant(gyroscopic: str) -> None:
-    law = caller(attitude_law("pd", inertia=J, k_p=4, k_d=6, gyroscopic=gyroscopic))
+    law = interpreted(attitude_law("pd", inertia=J, k_p=4, k_d=6, gyroscopic=gyroscopic))
     rng = np.random.default_rng(0)
     c = {"cancel": 1, "none": 0, "double": -1}[gyroscopic]
     for _ in range(5):
@@ -83,14 +78,14 @@ def test_lyapunov_rate_is_minus_kd_omega_squared_for_every_variant(gyroscopic: s
 def test_gyroscopic_term_of_the_printed_law_is_off_at_the_stored_point() -> None:
     theta, w = np.array([1.2, -0.8, 1]), np.array([0.3, -0.4, 0.5])
     true, printed = (
-        caller(attitude_law("pd", inertia=J, k_p=4, k_d=6, gyroscopic=g))(expm(hat(theta)), w)[0]
+        interpreted(attitude_law("pd", inertia=J, k_p=4, k_d=6, gyroscopic=g))(expm(hat(theta)), w)[0]
         for g in ("cancel", "double")
     )
     np.testing.assert_allclose(printed - true, [-0.8, -1.5, -0.72], atol=1e-12)
 
 
 def test_first_order_law_follows_its_closed_form() -> None:
-    law = caller(attitude_law("p", k_p=0.7))
+    law = interpreted(attitude_law("p", k_p=0.7))
     theta = np.array([2.0, -1.5, 1.0])
     run = solve_ivp(
         lambda _, x: (x.reshape(3, 3) @ hat(law(x)[0])).ravel(),
@@ -104,7 +99,7 @@ def test_first_order_law_follows_its_closed_form() -> None:
 
 def test_reduced_law_follows_its_closed_form_and_sees_only_its_direction() -> None:
     z = np.array([0.6, 0, 0.8])
-    law = caller(attitude_law("reduced", k_p=0.7, z=("3/5", 0, "4/5")))
+    law = interpreted(attitude_law("reduced", k_p=0.7, z=("3/5", 0, "4/5")))
     R0 = expm(hat(np.array([0.9, -0.4, 1.1])))
     run = solve_ivp(
         lambda _, x: (x.reshape(3, 3) @ hat(law(x.reshape(3, 3).T @ z)[0])).ravel(), (0, 2), R0.ravel(),
@@ -126,7 +121,7 @@ def test_reduced_law_follows_its_closed_form_and_sees_only_its_direction() -> No
 def test_logarithm_keeps_its_digits_from_0_to_180_degrees(angle: str) -> None:
     """Against 50-digit arithmetic of the closed form, from the exact matrix rounded to double."""
     kernel = attitude_law("p", k_p=1)
-    law = caller(kernel)
+    law = interpreted(kernel)
     axis = np.array([2.0, -1, 0.5]) / np.linalg.norm([2, -1, 0.5])
     with mpmath.workdps(50):
         theta = mpmath.mpf(angle)
@@ -140,7 +135,7 @@ def test_logarithm_keeps_its_digits_from_0_to_180_degrees(angle: str) -> None:
 
 
 def test_logarithm_at_180_degrees_picks_one_way_and_has_norm_pi() -> None:
-    law = caller(attitude_law("p", k_p=1))
+    law = interpreted(attitude_law("p", k_p=1))
     for axis in (np.array([1.0, 0, 0]), np.array([0, -1.0, 0]), np.array([0.6, 0, -0.8])):
         R = 2 * np.outer(axis, axis) - np.eye(3)
         theta = -law(R)[0]
@@ -150,7 +145,7 @@ def test_logarithm_at_180_degrees_picks_one_way_and_has_norm_pi() -> None:
 
 def test_no_unwinding() -> None:
     """340 degrees goes the short way, 20 degrees back."""
-    law = caller(attitude_law("p", k_p=1))
+    law = interpreted(attitude_law("p", k_p=1))
     theta = -law(expm(hat(np.radians([0, 0, 340.0]))))[0]
     np.testing.assert_allclose(theta, np.radians([0, 0, -20.0]), atol=1e-14)
 
@@ -159,7 +154,7 @@ def test_logarithm_derivative_matches_the_jacobian_of_proposition_11() -> None:
     """theta' = A(theta) omega, A = 1 + theta^/2 + (1 - (a/2) cot(a/2)) theta^2/a^2; also near 0 and near pi."""
     bound = {"inertia": J, "k_p": 4, "k_d": 6}
     with_cross, without = (
-        caller(attitude_lyapunov(**bound, epsilon=e, gyroscopic="none", name=f"v{i}"))
+        interpreted(attitude_lyapunov(**bound, epsilon=e, gyroscopic="none", name=f"v{i}"))
         for i, e in enumerate(("1/8", "1/16"))
     )
     rng = np.random.default_rng(1)
@@ -176,7 +171,7 @@ def test_logarithm_derivative_matches_the_jacobian_of_proposition_11() -> None:
 
 def test_cross_term_bound_makes_a_strict_lyapunov_function() -> None:
     bound = cross_term_bound(inertia=J, k_p=4, k_d=6)
-    function = caller(attitude_lyapunov(inertia=J, k_p=4, k_d=6, epsilon=0.999 * bound))
+    function = interpreted(attitude_lyapunov(inertia=J, k_p=4, k_d=6, epsilon=0.999 * bound))
     rng = np.random.default_rng(2)
     for _ in range(200):
         n = rng.normal(size=3)
@@ -191,7 +186,7 @@ def test_printed_region_of_attraction_fails_and_the_corrected_one_says_so() -> N
     assert 6 * w @ w <= np.pi**2 / 2
     region = attitude_region([0, 0, 0], w, inertia=J, k_p=0.05)
     assert not region.inside
-    law = caller(attitude_law("pd", inertia=J, k_p=0.05, k_d=0.1))
+    law = interpreted(attitude_law("pd", inertia=J, k_p=0.05, k_d=0.1))
 
     def reaches(_, x):
         return np.trace(x[:9].reshape(3, 3)) + 1 - 1e-9
@@ -244,7 +239,7 @@ def test_one_call_serves_all_kinds() -> None:
     X = Rotation.from_rotvec([0.3, -0.2, 0.4]).as_matrix()
     for kind, place in (("p", X), ("reduced", X[2])):
         law = attitude_law(kind, inertia=[3, 2, 2], k_p=4, k_d=6, gyroscopic="cancel")
-        np.testing.assert_array_equal(caller(law)(place)[0], caller(attitude_law(kind, k_p=4))(place)[0])
+        np.testing.assert_array_equal(interpreted(law)(place)[0], interpreted(attitude_law(kind, k_p=4))(place)[0])
 
 
 def test_a_legal_metric_of_no_rigid_body_warns_and_a_body_does_not() -> None:
@@ -259,11 +254,11 @@ def test_quaternion_input_gives_the_same_command_and_its_order_must_be_named() -
     law = attitude_law("pd", inertia=[3, 2, 2], k_p=4, k_d=6)
     rng = np.random.default_rng(0)
     for order, take in (("scalar_first", [3, 0, 1, 2]), ("scalar_last", [0, 1, 2, 3])):
-        by_quaternion = caller(with_quaternion(law, order=order))
+        by_quaternion = interpreted(with_quaternion(law, order=order))
         for _ in range(3):
             R, w = Rotation.random(random_state=rng), rng.normal(size=3)
             q = R.as_quat()[take]
-            expected = caller(law)(R.as_matrix(), w)[0]
+            expected = interpreted(law)(R.as_matrix(), w)[0]
             np.testing.assert_allclose(by_quaternion(q, w)[0], expected, atol=1e-13)
             np.testing.assert_allclose(by_quaternion(-q, w)[0], expected, atol=1e-13)  # no unwinding
             np.testing.assert_allclose(rotation_from_quaternion(q, order=order), R.as_matrix(), atol=1e-15)

@@ -9,22 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_calls import interpreted
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.control.closed_loop_package import generate_closed_loop
 from lie_codegen.errors import InputError
-from lie_codegen.kernel.casadi_arithmetic import function_of
 
 SO3, ONE, ZERO = lc.group("so3"), np.eye(3), np.zeros(3)
 INERTIA = np.array([[2, 0.3, -0.2], [0.3, 1.5, 0.1], [-0.2, 0.1, 1]])
 K, K_D = np.diag([4.0, 5, 6]), np.diag([3.0, 4, 5])
-
-
-def call(function: Any, *arguments: Any) -> list[np.ndarray]:
-    made = function(*(np.ravel(a) for a in arguments))
-    return [np.array(each).ravel() for each in (made if isinstance(made, tuple) else (made,))]
 
 
 def hybrid() -> Any:
@@ -42,10 +37,10 @@ def test_published_numbers_of_the_warp() -> None:
 
 def test_force_is_the_gradient_and_unwanted_points_are_critical() -> None:
     law, step = hybrid(), 1e-5
-    function = function_of(law)
+    function = interpreted(law)
     rng = np.random.default_rng(0)
     for E in [expm(SO3.hat(x)) for x in rng.normal(size=(4, 3))]:
-        force, q = call(function, E, ZERO, ONE, ZERO, ZERO, 1)
+        force, q = function(E, ZERO, ONE, ZERO, ZERO, 1)
         slope = [
             (
                 law.potential(E @ expm(SO3.hat(step * e)), int(q[0]))
@@ -61,19 +56,19 @@ def test_force_is_the_gradient_and_unwanted_points_are_critical() -> None:
         drops = [law.potential(E, q) - law.potential(E, -q) for E in points]
         assert drops == pytest.approx(law.gaps, abs=1e-9)
         for E in points:  # it jumps at once, and the torque of the same call is that of the other function
-            force, after = call(function, E, ZERO, ONE, ZERO, ZERO, q)
+            force, after = function(E, ZERO, ONE, ZERO, ZERO, q)
             assert after[0] == -q
             assert np.linalg.norm(force) > 1
 
 
 def flown(law: Any, X: np.ndarray, q: float, seconds: float, h: float = 0.01) -> tuple[np.ndarray, int, np.ndarray]:
     """Held torques, a fine splitting of the rotation between; the end, the number of jumps, angles."""
-    function = function_of(law)
+    function = interpreted(law)
     states = len(law.inputs) > 5
     omega, jumps, angles = np.zeros(3), 0, []
     for _ in range(round(seconds / h)):
         given = (X, omega, ONE, ZERO, ZERO, q) if states else (X, omega, ONE, ZERO, ZERO)
-        out = call(function, *given)
+        out = function(*given)
         if states:
             jumps += int(out[1][0] != q)
             q = out[1][0]
@@ -105,10 +100,10 @@ def test_hybrid_energy_falls_as_it_must_about_a_moving_reference() -> None:
     ad = np.einsum("ijk->ikj", SO3.algebra.structure_constants)
     for feedforward in ("basic", "right", "levi_civita"):
         law = lc.hybrid_law("so3", inertia=INERTIA, K_p=K, K_d=K_D, feedforward=feedforward)
-        function = function_of(law)
+        function = interpreted(law)
         X, X_d = (expm(SO3.hat(x)) for x in 0.5 * rng.normal(size=(2, 3)))
         xi, xi_d, rate = rng.normal(size=(3, 3))
-        force, q = call(function, X, xi, X_d, xi_d, rate, 1)
+        force, q = function(X, xi, X_d, xi_d, rate, 1)
         accel = np.linalg.solve(INERTIA, np.einsum("i,ikj->kj", xi, ad).T @ INERTIA @ xi + force)
 
         def energy(s: float, law=law, X=X, X_d=X_d, xi=xi, xi_d=xi_d, rate=rate, accel=accel, q=q) -> float:
@@ -145,7 +140,7 @@ def adaptive(**options: Any) -> Any:
 
 
 def adapted(law: Any, omega_d: Any, omega_d_dot: Any, seconds: float) -> np.ndarray:
-    function = function_of(law)
+    function = interpreted(law)
 
     def polar(M: np.ndarray) -> np.ndarray:
         U, _, V = np.linalg.svd(M)
@@ -154,7 +149,7 @@ def adapted(law: Any, omega_d: Any, omega_d_dot: Any, seconds: float) -> np.ndar
     def rate(t: float, s: np.ndarray) -> np.ndarray:
         R, R_d = polar(s[:9].reshape(3, 3)), polar(s[9:18].reshape(3, 3))
         w, a = s[18:21], s[21:]
-        force, change, _ = call(function, R, w, R_d, omega_d(t), omega_d_dot(t), a)
+        force, change, _ = function(R, w, R_d, omega_d(t), omega_d_dot(t), a)
         turn = np.linalg.solve(INERTIA, np.cross(INERTIA @ w, w) + force)
         return np.concatenate([(R @ SO3.hat(w)).ravel(), (R_d @ SO3.hat(omega_d(t))).ravel(), turn, change])
 

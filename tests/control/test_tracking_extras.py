@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kernel_calls import interpreted
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -20,7 +21,6 @@ from lie_codegen.control.reference_motion import formula_reference
 from lie_codegen.control.tracking_law import tracking_law
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.catalogue_load import group as load
-from lie_codegen.kernel.casadi_arithmetic import function_of
 from lie_codegen.vehicles.allocation import allocate, thruster_matrix
 from lie_codegen.vehicles.allocation_kernels import allocation_kernel
 from lie_codegen.vehicles.quadrotor import flat_reference, quadrotor_force, quadrotor_law
@@ -38,20 +38,16 @@ def vee(S: np.ndarray) -> np.ndarray:
     return np.array([S[2, 1], S[0, 2], S[1, 0]])
 
 
-def values(function, *arguments) -> list[np.ndarray]:
-    return [np.array(v).ravel() for v in function.call([np.ravel(a) for a in arguments])]
-
-
 def flown(t: float, X: np.ndarray, xi: np.ndarray, law, flat) -> tuple[float, np.ndarray]:
-    thrust, moment, *_ = values(law, X, xi, *values(flat, t))
+    thrust, moment, *_ = law(X, xi, *flat(t))
     return float(thrust[0]), moment
 
 
 def test_quadrotor_commanded_rates_are_the_derivatives_of_the_commanded_attitude() -> None:
     """Omega_c from the law against differences of R_c along the closed loop, R_c rebuilt here in numpy."""
     law, flat = (
-        function_of(quadrotor_law(**QUAD, gains=QUAD_GAINS)),
-        function_of(flat_reference(["sin(t)", "t/2", "cos(2*t)"], "t/3")),
+        interpreted(quadrotor_law(**QUAD, gains=QUAD_GAINS)),
+        interpreted(flat_reference(["sin(t)", "t/2", "cos(2*t)"], "t/3")),
     )
     J, m, g = np.diag(QUAD["inertia"]), QUAD["mass"], 9.80665
     rng = np.random.default_rng(0)
@@ -61,7 +57,7 @@ def test_quadrotor_commanded_rates_are_the_derivatives_of_the_commanded_attitude
 
     def commanded(t, x):
         R, p, v = x[:9].reshape(3, 3), x[9:12], x[12:15]
-        ref = values(flat, t)
+        ref = flat(t)
         A = (
             -QUAD_GAINS["k_x"] * (p - ref[0])
             - QUAD_GAINS["k_v"] * (v - ref[1])
@@ -97,7 +93,7 @@ def test_quadrotor_commanded_rates_are_the_derivatives_of_the_commanded_attitude
     R, W = x[:9].reshape(3, 3), x[15:]
     Y = np.eye(4)
     Y[:3, :3], Y[:3, 3] = R, x[9:12]
-    thrust, moment, Psi, body_rate = values(law, Y, np.concatenate([W, R.T @ x[12:15]]), *values(flat, t))
+    thrust, moment, Psi, body_rate = law(Y, np.concatenate([W, R.T @ x[12:15]]), *flat(t))
     assert thrust[0] == pytest.approx(f, rel=1e-12)
     np.testing.assert_allclose(body_rate, R.T @ R_c @ W_c, atol=2e-6)
     e_R, e_W = vee(R_c.T @ R - R.T @ R_c) / 2, W - R.T @ R_c @ W_c
@@ -128,14 +124,14 @@ def test_integral_action_removes_the_error_of_a_constant_disturbance() -> None:
     so3 = load("so3")
     gains = {"K_p": 6, "K_d": 6}
     disturbance, J = np.array([0.8, -0.5, 0.3]), np.diag([3.0, 2, 2])
-    plain = function_of(tracking_law(so3, inertia=J, error="so3_right", gains=gains))
-    full = function_of(integral_law(so3, inertia=J, error="so3_right", gains={**gains, "K_i": 4, "c": 1}))
+    plain = interpreted(tracking_law(so3, inertia=J, error="so3_right", gains=gains))
+    full = interpreted(integral_law(so3, inertia=J, error="so3_right", gains={**gains, "K_i": 4, "c": 1}))
     rest = (np.eye(3), np.zeros(3), np.zeros(3))
 
     def rate(law, with_integral):
         def f(_, x):
             R, w, s = x[:9].reshape(3, 3), x[9:12], x[12:]
-            out = values(law, R, w, *rest, *([s] if with_integral else []))
+            out = law(R, w, *rest, *([s] if with_integral else []))
             torque = out[0] + disturbance
             s_dot = out[1] if with_integral else 0 * s
             return np.concatenate([(R @ so3.hat(w)).ravel(), np.linalg.solve(J, torque - np.cross(w, J @ w)), s_dot])
@@ -163,11 +159,11 @@ def test_the_integral_law_in_the_compiled_loop_and_its_c(tmp_path: Path) -> None
     run = lc.closed_loop(
         so3, inertia=J, law=law, reference=still, external=lambda *_: disturbance, X0=R0, t=np.linspace(0, 2, 9)
     )
-    plain, rest = function_of(law), (np.eye(3), np.zeros(3), np.zeros(3))
+    plain, rest = interpreted(law), (np.eye(3), np.zeros(3), np.zeros(3))
 
     def rate(_, x):
         R, w, s = x[:9].reshape(3, 3), x[9:12], x[12:]
-        out = values(plain, R, w, *rest, s)
+        out = plain(R, w, *rest, s)
         w_dot = np.linalg.solve(J, out[0] + disturbance - np.cross(w, J @ w))
         return np.concatenate([(R @ so3.hat(w)).ravel(), w_dot, out[1]])
 
@@ -209,12 +205,12 @@ def test_anti_windup_shortens_the_overshoot_under_limits() -> None:
     base = {"K_p": 8, "K_d": 6, "K_i": 4, "c": 1}
 
     def overshoot(w):
-        law = function_of(integral_law(so3, inertia=J, error="so3_right", gains={**base, "w": w}, limits=0.4))
+        law = interpreted(integral_law(so3, inertia=J, error="so3_right", gains={**base, "w": w}, limits=0.4))
 
         def rate(_, x):
             left, _, right = np.linalg.svd(x[:9].reshape(3, 3))
             R, v, s = left @ right, x[9:12], x[12:]  # this integrator leaves the group, where the law gives NaN
-            force, s_dot, *_ = values(law, R, v, *rest, s)
+            force, s_dot, *_ = law(R, v, *rest, s)
             assert np.max(np.abs(force)) <= 0.4 + 1e-15
             return np.concatenate([(R @ so3.hat(v)).ravel(), np.linalg.solve(J, force - np.cross(v, J @ v)), s_dot])
 
@@ -227,10 +223,10 @@ def test_anti_windup_shortens_the_overshoot_under_limits() -> None:
 
 def test_limits_clip_the_first_output_and_nothing_else() -> None:
     law = attitude_law("pd", inertia=[3, 2, 2], k_p=4, k_d=6)
-    clipped = function_of(with_limits(law, [0.1, 0.2, 0.3]))
+    clipped = interpreted(with_limits(law, [0.1, 0.2, 0.3]))
     R, w = expm(hat(np.array([1.0, -1, 0.01]))), np.zeros(3)
-    torque, V, _ = values(clipped, R, w)
-    free, V_free, _ = values(function_of(law), R, w)
+    torque, V, _ = clipped(R, w)
+    free, V_free, _ = interpreted(law)(R, w)
     np.testing.assert_allclose(torque, np.clip(free, [-0.1, -0.2, -0.3], [0.1, 0.2, 0.3]))
     assert V_free == V
     with pytest.raises(InputError, match="must be positive"):
@@ -266,7 +262,7 @@ def test_a_current_is_a_galilean_boost() -> None:
 def test_restoring_forces_and_damping_by_hand() -> None:
     se3 = load("se3")
     X, xi = expm(se3.hat([0.3, -0.2, 0.5, 1, 0, 0])), np.array([0.1, 0.2, -0.3, 0.5, 0.1, 0])
-    force = values(function_of(underwater_kernel(vehicle())), X, xi)[0]
+    force = interpreted(underwater_kernel(vehicle()))(X, xi)[0]
     down = X[:3, :3].T @ [0, 0, 1]
     torque = np.cross([0, 0, 0.1], 98.1 * down) + np.cross([0, 0, -0.05], -100 * down)
     drag = np.array([1, 1, 1, 2, 4, 4]) * xi + np.array([1, 1, 1, 3, 5, 5]) * np.abs(xi) * xi
@@ -301,9 +297,9 @@ def test_allocation_reproduces_the_force_with_the_least_effort() -> None:
     rng = np.random.default_rng(0)
     B = thruster_matrix(rng.normal(size=(8, 3)), rng.normal(size=(8, 3)))
     prices = rng.uniform(1, 3, size=8)
-    kernel = function_of(allocation_kernel(allocate(B, weights=prices)))
+    kernel = interpreted(allocation_kernel(allocate(B, weights=prices)))
     f = rng.normal(size=6)
-    u, residual = values(kernel, f)
+    u, residual = kernel(f)
     np.testing.assert_allclose(B @ u, f, atol=1e-12)
     np.testing.assert_allclose(residual, 0, atol=1e-12)
     for null in np.linalg.svd(B)[2][6:]:
@@ -316,14 +312,14 @@ def test_one_sided_jets_push_only_and_say_what_is_left_undone() -> None:
     positions, directions = np.vstack([arms, arms]), np.vstack([sides, -sides])
     B = thruster_matrix(positions, directions)[:3]
     allocation = allocate(B, one_sided=True)
-    kernel = function_of(allocation_kernel(allocation, limits=1, namespace="so3"))
+    kernel = interpreted(allocation_kernel(allocation, limits=1, namespace="so3"))
     rng = np.random.default_rng(1)
     for f in rng.normal(size=(20, 3)):
-        u, residual = values(kernel, 0.2 * f)
+        u, residual = kernel(0.2 * f)
         assert np.all(u >= -1e-15)
         np.testing.assert_allclose(B @ u + residual, 0.2 * f, atol=1e-14)
         np.testing.assert_allclose(residual, 0, atol=1e-13)
-    assert np.max(np.abs(values(kernel, [100, 0, 0])[1])) > 1
+    assert np.max(np.abs(kernel([100, 0, 0])[1])) > 1
     with pytest.raises(InputError, match="out of reach"):
         allocate(np.eye(3), one_sided=True)
     with pytest.raises(InputError, match="span 2 of 3"):

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from kernel_calls import interpreted
 
 from lie_codegen.control.error_function import ErrorSymbols
 from lie_codegen.control.tracking_law import FEEDFORWARDS, tracking_law
@@ -41,11 +42,11 @@ def law(index: int, feedforward: str) -> tuple[MatrixGroup, Kernel, Callable[...
     name, error, gains, inertia = PAIRS[index]
     group = load(name)
     kernel = tracking_law(group, inertia=inertia, error=error, gains=gains, feedforward=feedforward)
-    function = function_of(kernel)
+    function = interpreted(kernel)
 
     def call(X: np.ndarray, *vectors: np.ndarray) -> list[np.ndarray]:
         flat = [interleaved(group, a) if np.ndim(a) == 2 else a for a in (X, *vectors)]
-        return [np.array(value).ravel() for value in function(*flat)]
+        return function(*flat)
 
     return group, kernel, call
 
