@@ -79,7 +79,7 @@ def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, di
     }
     names = [port.name for port in kernel.inputs[1:]]
     flat = np.ascontiguousarray(states.reshape(-1, inner))
-    made = kernel.batch(flat, **{name: given[name] for name in names}, threads=run.threads)
+    made = run.sampled_at(kernel, flat, **{name: given[name] for name in names})
     values = {port.name: v.reshape(*shape, *v.shape[1:]) for port, v in zip(kernel.outputs, made, strict=True)}
     return values, values.pop(kernel.outputs[-1].name), moves
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_model import NOISE, Loop
 from lie_codegen.errors import ComputationError
+from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.rows import rows
 from lie_codegen.runtime.sampled_loop import NoiseStream, SampledTask, sampled_loop
 from lie_codegen.runtime.threads import step_pieces
 
@@ -66,9 +68,14 @@ class Run:
         """X_d, xi_d and xi_d_dot at the times, by name; nothing without a reference."""
         if not self.loop.moving:
             return {}
-        return dict(
-            zip(("X_d", "xi_d", "xi_d_dot"), self.library.reference.batch(np.ascontiguousarray(t)), strict=True)
-        )
+        made = self.sampled_at(self.library.reference, np.ascontiguousarray(t))
+        return dict(zip(("X_d", "xi_d", "xi_d_dot"), made, strict=True))
+
+    def sampled_at(self, kernel: Compiled[Any], *samples: Any, **named: Any) -> tuple[Array, ...]:
+        """A kernel of the loop at samples: on lanes where there are many loops, for which lanes are compiled anyhow."""
+        if not self.many:
+            return rows(kernel, *samples, **named)
+        return tuple(kernel.batch(*samples, threads=self.threads, **named))
 
     def _continuous(self, every: int) -> Array:
         total = every * (len(self.times) - 1)

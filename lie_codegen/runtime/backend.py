@@ -30,6 +30,9 @@ class Backend(Protocol):
     def batch(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
         """`count` evaluations; strides in doubles from one sample of an input to the next, 0 to repeat it."""
 
+    def calls(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
+        """The same as `count` times `call`, without lanes."""
+
     def scan(
         self, count: int, every: int, inputs: Arrays, strides: Sequence[int], trajectory: np.ndarray[Any, Any]
     ) -> None:
@@ -84,6 +87,9 @@ class CtypesBackend:
         self._signature = signature
         self._idle: list[_Workspace] = []  # pop and append are atomic: no two calls ever share a workspace
         self._call = _function(library, f"{symbol}_call", void, void)
+        self._calls = _function(
+            library, f"{symbol}_batch", size, void, void, void
+        )  # one lane: a loop over the function
         self._scan = None
         if is_step(signature.inputs, signature.outputs):
             self._scan = _function(library, f"{symbol}_scan", size, size, void, void, void)
@@ -119,6 +125,9 @@ class CtypesBackend:
 
     def batch(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
         self._batch(count, _pointers(inputs), _strides(strides), _pointers(outputs))
+
+    def calls(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
+        self._calls(count, _pointers(inputs), _strides(strides), _pointers(outputs))
 
     def scan(
         self, count: int, every: int, inputs: Arrays, strides: Sequence[int], trajectory: np.ndarray[Any, Any]

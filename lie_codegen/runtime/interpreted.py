@@ -34,6 +34,8 @@ class InterpretedBackend:
             for target, result in zip(targets, results, strict=True):
                 target[k] = result.nonzeros()
 
+    calls = batch
+
     def scan(
         self, count: int, every: int, inputs: Arrays, strides: Sequence[int], trajectory: np.ndarray[Any, Any]
     ) -> None:
@@ -111,6 +113,10 @@ class Rounded:
     def batch(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
         with _doubles(outputs) as wide:
             self._backend.batch(count, [_widened(array) for array in inputs], strides, wide)
+
+    def calls(self, count: int, inputs: Arrays, strides: Sequence[int], outputs: Arrays) -> None:
+        with _doubles(outputs) as wide:
+            self._backend.calls(count, [_widened(array) for array in inputs], strides, wide)
 
     def scan(
         self, count: int, every: int, inputs: Arrays, strides: Sequence[int], trajectory: np.ndarray[Any, Any]
