@@ -22,6 +22,7 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import Motion
+from lie_codegen.runtime.rows import row_by_row
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -157,7 +158,7 @@ def _orbit(
     system = _system(kernels)
     start, length, residual, monodromy = found_orbit(system, guess, period, driven, section, transient)
     moments = np.arange(256) / 256 * length
-    jacobians = np.asarray(system.library.jacobian.batch(system.motion(start, length).at(moments), moments))
+    jacobians = row_by_row(system.library.jacobian, system.motion(start, length).at(moments), moments)[0]
     mean = jacobians.mean(axis=0)
     volume = np.exp(length * float(np.trace(mean)))
     liouville = abs(float(np.linalg.det(monodromy)) - volume) / volume

@@ -14,7 +14,7 @@ from lie_codegen.control.loop_model import NOISE, Loop
 from lie_codegen.errors import ComputationError
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.library import Library
-from lie_codegen.runtime.rows import rows
+from lie_codegen.runtime.rows import row_by_row
 from lie_codegen.runtime.sampled_loop import NoiseStream, SampledTask, sampled_loop
 from lie_codegen.runtime.threads import step_pieces
 
@@ -74,7 +74,7 @@ class Run:
     def sampled_at(self, kernel: Compiled[Any], *samples: Any, **named: Any) -> tuple[Array, ...]:
         """A kernel of the loop at samples: on lanes where there are many loops, for which lanes are compiled anyhow."""
         if not self.many:
-            return rows(kernel, *samples, **named)
+            return row_by_row(kernel, *samples, **named)
         return tuple(kernel.batch(*samples, threads=self.threads, **named))
 
     def _continuous(self, every: int) -> Array:

@@ -11,6 +11,7 @@ from lie_codegen.errors import ChartError
 from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.rows import row_by_row
 
 #: (first, last) -> u at the start, the middle and the end of these steps, and their lengths.
 Samples = Callable[[int, int], tuple[Array, Array, Array, Array]]
@@ -69,7 +70,7 @@ def _why(group: MatrixGroup) -> str:
 def _inside(group: MatrixGroup, g: Array) -> Array:
     """(k,) whether det M(g)^-1 is finite and positive, as at g = 0; the chart ends where it vanishes."""
     finite = np.all(np.isfinite(g), axis=1)
-    M = integrators(group).wei_norman_matrix.batch(np.where(finite[:, None], g, 0.0))
+    M = row_by_row(integrators(group).wei_norman_matrix, np.where(finite[:, None], g, 0.0))[0]
     sign, size = np.linalg.slogdet(np.where(np.isfinite(M), M, 0.0))
     return np.asarray(finite & (sign > 0) & (size < _EDGE))
 
@@ -81,13 +82,13 @@ def newton(group: MatrixGroup, g: Array, X: Array, iterations: int = 4) -> Array
     for _ in range(iterations):
         finite = np.all(np.isfinite(g), axis=1)
         safe = np.where(finite[:, None], g, 0.0)
-        residual = group.project(np.linalg.inv(lib.product_exp.batch(safe)) @ X - identity)
-        step = np.einsum("kij,kj->ki", lib.wei_norman_matrix.batch(safe), residual)
+        residual = group.project(np.linalg.inv(row_by_row(lib.product_exp, safe)[0]) @ X - identity)
+        step = np.einsum("kij,kj->ki", row_by_row(lib.wei_norman_matrix, safe)[0], residual)
         g = np.where(finite[:, None] & (np.linalg.norm(residual, axis=1) < 0.5)[:, None], g + step, g)
     return g
 
 
 def mismatch(group: MatrixGroup, g: Array, X: Array) -> Array:
     """(k,) max |Phi(g) - X|; NaN where g is not finite."""
-    phi = integrators(group).product_exp.batch(np.ascontiguousarray(g))
+    phi = row_by_row(integrators(group).product_exp, np.ascontiguousarray(g))[0]
     return np.asarray(np.max(np.abs(phi - X), axis=(1, 2)))

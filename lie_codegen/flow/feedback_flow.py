@@ -156,7 +156,7 @@ def _compiled(
     g = run.y[..., n:]
     clock = np.repeat(times, count)
     place = X.reshape(-1, group.degree, group.degree) if law.reads == "X" else g.reshape(-1, n)
-    u = library.feedback_value.batch(clock, np.ascontiguousarray(place)).reshape(len(times), count, n)
+    u = rows(library.feedback_value, clock, np.ascontiguousarray(place))[0].reshape(len(times), count, n)
     return X, g, u, run.steps, run.error_estimate, run.evaluations
 
 

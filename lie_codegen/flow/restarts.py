@@ -17,6 +17,7 @@ from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.runtime.rows import row_by_row
 
 _SMALLEST_DETERMINANT = 0.25
 _LARGEST_GROWTH = 10.0
@@ -115,7 +116,7 @@ def _until_edge(group: MatrixGroup, grid: Grid, samples: Samples, begin: int, or
 def _edges(group: MatrixGroup, g: Array) -> tuple[Array, Array]:
     """(k,) whether the determinant is too small, and whether M is too large."""
     finite = np.all(np.isfinite(g), axis=1)
-    M = integrators(group).wei_norman_matrix.batch(np.where(finite[:, None], g, 0.0))
+    M = row_by_row(integrators(group).wei_norman_matrix, np.where(finite[:, None], g, 0.0))[0]
     good = finite & np.all(np.isfinite(M), axis=(1, 2))
     M = np.where(good[:, None, None], M, np.eye(group.dim))
     sign, size = np.linalg.slogdet(M)

@@ -12,6 +12,7 @@ from lie_codegen.flow.libraries import integrators
 from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.rows import row_by_row
 
 #: Of the random starts.
 _SEED = 20
@@ -70,7 +71,7 @@ def _damped(group: MatrixGroup, g: Array, target: Array) -> Array:
         step = np.linalg.solve(normal, -np.einsum("kri,kr->ki", columns, residual)[..., None])[..., 0]
         trial = g + step
         with np.errstate(all="ignore"):
-            values = lib.product_exp.batch(trial)
+            values = row_by_row(lib.product_exp, trial)[0]
         new_cost = np.sum(np.abs(values - target) ** 2, axis=(1, 2))
         better = new_cost < cost
         g = np.where(better[:, None], trial, g)
@@ -84,11 +85,11 @@ def _damped(group: MatrixGroup, g: Array, target: Array) -> Array:
 def _linearised(group: MatrixGroup, g: Array, target: Array) -> tuple[Array, Array]:
     """Residual Phi(g) - X and its derivative by g, real and imaginary parts stacked: d/dg_k Phi = Phi hat(M^-1 e_k)."""
     lib = integrators(group)
-    phi = lib.product_exp.batch(np.ascontiguousarray(g))
+    phi = row_by_row(lib.product_exp, np.ascontiguousarray(g))[0]
     difference = (phi - target).reshape(len(g), -1)
     with np.errstate(all="ignore"):
         inverse = np.linalg.pinv(
-            np.nan_to_num(lib.wei_norman_matrix.batch(np.ascontiguousarray(g)), posinf=0, neginf=0)
+            np.nan_to_num(row_by_row(lib.wei_norman_matrix, np.ascontiguousarray(g))[0], posinf=0, neginf=0)
         )
     directions = group.hat(np.swapaxes(inverse, 1, 2))
     moved = (phi[:, None] @ directions).reshape(len(g), group.dim, -1)

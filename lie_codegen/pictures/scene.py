@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.rows import row_by_row
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 
 BODIES = ("box", "satellite", "vehicle", "car", "arrow")
@@ -72,7 +73,7 @@ def motion_of(group: MatrixGroup, X: Array) -> Motion:
         R = np.tile(np.eye(3), (len(X), 1, 1))
         R[:, :2, :2] = X[:, :2, :2]
         return Motion("plane", R, np.column_stack([X[:, :2, 2], np.zeros(len(X))]))
-    x = logarithms(group).log.batch(np.ascontiguousarray(X))
+    x = row_by_row(logarithms(group).log, np.ascontiguousarray(X))[0]
     p = np.zeros((len(X), 3))
     p[:, : min(3, group.dim)] = np.nan_to_num(x[:, :3])
     return Motion("point", np.tile(np.eye(3), (len(X), 1, 1)), p)
@@ -80,7 +81,7 @@ def motion_of(group: MatrixGroup, X: Array) -> Motion:
 
 def distance_curve(group: MatrixGroup, X: Array, target: Array, name: str) -> Curves:
     """|log(target^-1 X)| along a path."""
-    x = logarithms(group).log.batch(np.ascontiguousarray(np.linalg.solve(target, X)))
+    x = row_by_row(logarithms(group).log, np.ascontiguousarray(np.linalg.solve(target, X)))[0]
     return Curves(name, "", [""], np.linalg.norm(x, axis=1)[:, None])
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError
 from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.rows import row_by_row
 
 
 def broadcast_call(function: Compiled[Any], *arguments: ArrayLike) -> tuple[Array, ...]:
@@ -47,7 +48,6 @@ def broadcast_call(function: Compiled[Any], *arguments: ArrayLike) -> tuple[Arra
         np.ascontiguousarray(np.broadcast_to(a, (*batch, *p.shape))).reshape((count, *p.shape))
         for a, p in zip(arrays, function.inputs, strict=True)
     ]
-    results: Any = function.batch(*flat)
-    if len(function.outputs) == 1:
-        results = (results,)
-    return tuple(np.asarray(r).reshape((*batch, *p.shape))[()] for r, p in zip(results, function.outputs, strict=True))
+    return tuple(
+        r.reshape((*batch, *p.shape))[()] for r, p in zip(row_by_row(function, *flat), function.outputs, strict=True)
+    )

@@ -13,7 +13,7 @@ from lie_codegen.runtime.call import Compiled
 FEW = 2**14
 
 
-def rows(function: Compiled[Any], *args: Any, **named: Any) -> tuple[Array, ...]:
+def row_by_row(function: Compiled[Any], *args: Any, **named: Any) -> tuple[Array, ...]:
     """The outputs as `function.batch` gives them, as arrays in their order.
 
     Up to `FEW` samples each is, to the last bit, what a call gives, and no lanes are compiled for them; beyond, they are those of the batch.

@@ -25,6 +25,7 @@ from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.runtime.rows import row_by_row
 from lie_codegen.steering.front import steer
 from lie_codegen.steering.plan import Plan
 
@@ -65,7 +66,7 @@ class KineticMetric(Saved):
         if path.ndim != 3 or len(path) < 2 or path.shape[1:] != (self.group.degree,) * 2:
             raise ShapeError(f"length takes (k, {self.group.degree}, {self.group.degree}) elements, got {path.shape}")
         steps = np.linalg.inv(path[:-1]) @ path[1:]
-        return float(np.sum(self.norm(build(self.group).log.batch(np.ascontiguousarray(steps)))))
+        return float(np.sum(self.norm(row_by_row(build(self.group).log, np.ascontiguousarray(steps))[0])))
 
     def geodesic(self, X: ArrayLike, Y: ArrayLike) -> Plan:
         """The shortest geodesic found from X to Y in unit time, a plan from the identity to X^{-1} Y in the basis `frame`.

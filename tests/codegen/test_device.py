@@ -55,8 +55,9 @@ def reals(array: np.ndarray, real: str) -> np.ndarray:
 
 
 def wanted(group: str, kernel: lc.Kernel, arrays: list[np.ndarray]) -> list[np.ndarray]:
-    found = lc.build(group)[kernel.name].batch(*arrays)
-    return [np.asarray(each) for each in (found if isinstance(found, tuple) else (found,))]
+    function = lc.build(group)[kernel.name]
+    found = [made if isinstance(made := function(*sample), tuple) else (made,) for sample in zip(*arrays, strict=True)]
+    return [np.array(each) for each in zip(*found, strict=True)]
 
 
 def agree(found: np.ndarray, exact: np.ndarray, real: str, what: str) -> None:

@@ -21,6 +21,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.runtime.rows import row_by_row
 
 if TYPE_CHECKING:
     from lie_codegen.runtime.library import Library
@@ -84,7 +85,7 @@ def admitted_all(group: MatrixGroup, X: Array, where: str) -> tuple[Array, Array
         NotOnGroupError: naming the first that is refused by its number.
     """
     several = np.ascontiguousarray(X, dtype=group.basis.dtype)
-    if np.all(np.asarray(_library(group).defect.batch(several)) <= ON_GROUP):
+    if np.all(row_by_row(_library(group).defect, several)[0] <= ON_GROUP):
         return several, np.zeros(len(several))
     each = [admitted(group, matrix, f"{where}[{number}]") for number, matrix in enumerate(several)]
     return np.array([one.X for one in each]), np.array([one.projected for one in each])

@@ -15,6 +15,7 @@ from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.runtime.rows import row_by_row
 
 #: The iteration converges linearly at worst, with the square of the spread of the data as its rate: this is far beyond.
 _MOST_STEPS = 200
@@ -107,7 +108,7 @@ def interpolate(group: MatrixGroup | str | Path, X: ArrayLike, Y: ArrayLike, s: 
     if not np.all(np.isfinite(parts)):
         raise NotFiniteError("interpolate: s holds NaN or infinity")
     [x] = _logarithms(found, start, end[None], "interpolate")
-    moved = build(found).exp.batch(np.ascontiguousarray(parts.reshape(-1, 1) * x))
+    moved = row_by_row(build(found).exp, np.ascontiguousarray(parts.reshape(-1, 1) * x))[0]
     result: Array = (start @ moved).reshape(*parts.shape, found.degree, found.degree)
     return result
 
@@ -131,7 +132,7 @@ def _weights(given: ArrayLike | None, count: int) -> Array:
 def _logarithms(group: MatrixGroup, X: Array, elements: Array, where: str) -> Array:
     """(N, n) log(X^-1 X_i)."""
     with np.errstate(all="ignore"):
-        logs = np.asarray(build(group).log.batch(np.ascontiguousarray(np.linalg.inv(X) @ elements)))
+        logs = row_by_row(build(group).log, np.ascontiguousarray(np.linalg.inv(X) @ elements))[0]
     bad = np.flatnonzero(~np.all(np.isfinite(logs), axis=1))
     if bad.size:
         raise ComputationError(

@@ -18,6 +18,7 @@ from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.covariance import compounded, flowed, transported
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.runtime.rows import row_by_row
 from lie_codegen.values import settle
 
 _MOST_STEPS = 50
@@ -137,7 +138,7 @@ class Uncertain(Saved):
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0))
         xi = self.mean_shift + rng.normal(size=(count, self.group.dim)) @ root.T
-        moved: Array = self.X @ build(self.group).exp.batch(np.ascontiguousarray(xi))
+        moved: Array = self.X @ row_by_row(build(self.group).exp, np.ascontiguousarray(xi))[0]
         return moved
 
     def _adjoint(self, X: Array) -> Array:

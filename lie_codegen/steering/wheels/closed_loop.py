@@ -18,6 +18,7 @@ from lie_codegen.groups.build import build
 from lie_codegen.groups.maps.element_pattern import packed_size
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.mechanics.states import initial_states
+from lie_codegen.runtime.rows import row_by_row
 from lie_codegen.steering.wheels.body import WheeledBody
 from lie_codegen.steering.wheels.kernels import arguments_of
 from lie_codegen.steering.wheels.loop import TRACKING, wheel_loop_step
@@ -169,7 +170,7 @@ def _desired(system: WheeledBody, target: Any, reference: Reference | None, t: A
         return {"target": element_of(system, target)}
     if reference.group != system.group:
         raise InputError(f"the reference is one of {reference.group.name}, not of {system.group.name}")
-    X, xi, rate = build([reference_kernel(reference)]).reference.batch(t)
+    X, xi, rate = row_by_row(build([reference_kernel(reference)]).reference, t)
     return {"target": X, "xi_d": xi, "xi_d_dot": rate}
 
 
