@@ -25,6 +25,7 @@ from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.rows import row_by_row
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +157,7 @@ def _compiled(
     g = run.y[..., n:]
     clock = np.repeat(times, count)
     place = X.reshape(-1, group.degree, group.degree) if law.reads == "X" else g.reshape(-1, n)
-    u = rows(library.feedback_value, clock, np.ascontiguousarray(place))[0].reshape(len(times), count, n)
+    u = row_by_row(library.feedback_value, clock, np.ascontiguousarray(place))[0].reshape(len(times), count, n)
     return X, g, u, run.steps, run.error_estimate, run.evaluations
 
 

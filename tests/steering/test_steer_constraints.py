@@ -104,7 +104,7 @@ def test_via_points_are_met() -> None:
 
 def test_limits_that_cannot_be_met_are_named() -> None:
     with pytest.raises(SteeringError, match="times the bound of w1"):
-        lc.steer(lc.group("so3"), G, ("w1", "w2"), 1.0, bounds={"w1": 0.05}, intervals=16, starts=1)
+        lc.steer(lc.group("so3"), G, ("w1", "w2"), 1.0, bounds={"w1": 0.05}, intervals=8, starts=1)
     inside = Cone((0, 0, 1), (0, 0, 1), 0.1)
     with pytest.raises(SteeringError, match="start itself is inside obstacle 1"):
         lc.steer(
