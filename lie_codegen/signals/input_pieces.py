@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 from lie_codegen.errors import InputError, PeriodError, ShapeError
 from lie_codegen.exact.expression import time_symbol
@@ -16,7 +16,7 @@ from lie_codegen.signals.waveform import Waveform
 #: (end, formulas) of each piece, as they were given.
 Pieces = tuple[tuple[Any, tuple[Any, ...]], ...]
 #: Their ends, their formulas, and the symbols of the parameters.
-Read = tuple[list[sp.Expr], list[list[sp.Expr]], tuple[sp.Symbol, ...]]
+Read: TypeAlias = "tuple[list[sp.Expr], list[list[sp.Expr]], tuple[sp.Symbol, ...]]"
 
 
 def read_pieces(given: Pieces, parameters: Sequence[str]) -> Read:
