@@ -206,8 +206,10 @@ from .signals import SampledInput as SampledInput
 
 # steering
 from .steering import Ball as Ball
+from .steering import Box as Box
 from .steering import Cone as Cone
 from .steering import Coset as Coset
+from .steering import Cylinder as Cylinder
 from .steering import Plan as Plan
 from .steering import Pointing as Pointing
 from .steering import Position as Position

@@ -1,5 +1,7 @@
 """Steering: tasks, goals, constraints, plans and open optimal control."""
 
+from .blocks import Box as Box
+from .blocks import Cylinder as Cylinder
 from .constraints import Ball as Ball
 from .constraints import Cone as Cone
 from .front import steer as steer

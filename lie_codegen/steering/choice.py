@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.steering.constraints import Ball
 from lie_codegen.steering.goals import GoalSet
 
 #: Options that no other method than "ocp" has, and none other than "direct".
@@ -31,6 +32,7 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
     if _avoids(options):
         # a few obstacles are the transcription's first, where it has all that is asked for; it is compiled for their number (decision 24)
         unusual = bool(given & _DIRECT) or callable(options.get("drift")) or not _plain(controls)
+        unusual = unusual or options.get("objective") == "fuel"
         return unusual or (
             _only_direct(given) and len(options["obstacles"]) > _FEW and not _discs(options["obstacles"])
         )
@@ -59,9 +61,9 @@ def goes_around(method: str, controls: Sequence[Any], options: Mapping[str, Any]
 
 
 def _avoids(options: Mapping[str, Any]) -> bool:
-    """Whether there are obstacles, and the least energy among them is asked for."""
+    """Whether there are obstacles."""
     obstacles = options.get("obstacles")
-    return isinstance(obstacles, list | tuple) and len(obstacles) > 0 and options.get("objective", "energy") == "energy"
+    return isinstance(obstacles, list | tuple) and len(obstacles) > 0
 
 
 def _plain(controls: Sequence[Any]) -> bool:
@@ -69,7 +71,7 @@ def _plain(controls: Sequence[Any]) -> bool:
 
 
 def _discs(obstacles: Any) -> bool:
-    return all(len(getattr(each, "center", ())) == 2 for each in obstacles)
+    return all(isinstance(each, Ball) and len(each.center) == 2 for each in obstacles)
 
 
 def _only_direct(given: set[str]) -> bool:

@@ -12,6 +12,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.steering.blocks import Box, Cylinder
+from lie_codegen.steering.obstacles.solids import Solids
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,31 +98,49 @@ class Ball(Saved):
         p = X[:, :-1, -1] - np.asarray(self.center)
         return np.asarray(np.sum(p * p, axis=1) - self.radius**2)
 
+    def solid(self) -> Solids:
+        """As arrays of one."""
+        q = len(self.center)
+        return Solids(
+            np.array([self.center], dtype=float),
+            np.eye(q)[None],
+            np.zeros((1, q)),
+            np.array([float(self.radius)]),
+            np.zeros(1, dtype=bool),
+        )
 
-Obstacle = Cone | Ball
+
+Obstacle = Cone | Ball | Box | Cylinder
+_OBSTACLES = (Cone, Ball, Box, Cylinder)
 
 
 def check_obstacles(group: MatrixGroup, obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
     """The obstacles, fit for the group.
 
     Raises:
-        SteeringInputError: a cone where X does not begin with a rotation of space, a ball where there is no position.
+        SteeringInputError: a cone where X does not begin with a rotation of space, another obstacle where there is no position.
     """
-    if isinstance(obstacles, Cone | Ball) or not isinstance(obstacles, Sequence):
-        raise SteeringInputError(f"obstacles is a list of Cones and Balls: write obstacles=[{obstacles!r:.80}]")
+    if isinstance(obstacles, _OBSTACLES) or not isinstance(obstacles, Sequence):
+        raise SteeringInputError(
+            f"obstacles is a list of Cones, Balls, Boxes and Cylinders: write obstacles=[{obstacles!r:.80}]"
+        )
     flat = all(matrix[-1, j] == 0 for matrix in group.exact_basis for j in range(group.degree))
     for obstacle in obstacles:
         if isinstance(obstacle, Cone):
             if group.is_complex or not _rotates(group):
                 raise SteeringInputError(f"a Cone needs a group of rotations of space (so3, se3), not {group.name}")
-        elif not isinstance(obstacle, Ball):
-            raise SteeringInputError(f"an obstacle is a Cone or a Ball, got {obstacle!r}")
-        elif not flat or group.is_complex or len(obstacle.center) != group.degree - 1:
+            obstacle.parameters()
+            continue
+        if not isinstance(obstacle, _OBSTACLES):
+            raise SteeringInputError(f"an obstacle is a Cone, a Ball, a Box or a Cylinder, got {obstacle!r}")
+        if isinstance(obstacle, Ball):
+            obstacle.parameters()
+        q = len(obstacle.start if isinstance(obstacle, Cylinder) else obstacle.center)
+        if not flat or group.is_complex or q != group.degree - 1:
             raise SteeringInputError(
-                f"a Ball with {len(obstacle.center)} coordinates needs a group of motions of as many dimensions (se2, se3), "
+                f"a {type(obstacle).__name__} with {q} coordinates needs a group of motions of as many dimensions (se2, se3), "
                 f"not {group.name}"
             )
-        obstacle.parameters()
     return tuple(obstacles)
 
 

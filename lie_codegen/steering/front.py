@@ -127,7 +127,7 @@ def steer(
         weights: (m,) positive weights w_i of the cost sum w_i u_i^2; ones.
         objective: "energy" (default), "time" or "fuel" (transcription: not fuel).
         longest: longest duration allowed for "time", in units of `duration`; 20.
-        obstacles: `Cone`s and `Ball`s to keep out of, on all of the way; none (transcription, direct).
+        obstacles: `Cone`s, `Ball`s, `Box`es and `Cylinder`s to keep out of, on all of the way; none (transcription, direct).
         classes: classes of ways around them that are tried, which cannot be drawn into each other; 4 (discs: transcription; direct).
         via: (fraction of the duration, element or coordinates) to pass through; none (transcription).
         rest: controls are zero at both ends; False (transcription).

@@ -17,7 +17,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringInputError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.constraints import Ball, Cone, check_obstacles
+from lie_codegen.steering.blocks import Box, Cylinder
+from lie_codegen.steering.constraints import Cone, Obstacle, check_obstacles
 from lie_codegen.steering.plan import Plan
 
 
@@ -56,10 +57,18 @@ def _pairs(via: Sequence[Any]) -> list[tuple[float, Any]]:
         raise SteeringInputError(f"via: give pairs (fraction of the duration, element), got {via!r:.80}") from None
 
 
-def _seen(obstacle: Ball | Cone, here: Array) -> Ball | Cone:
+def _seen(obstacle: Obstacle, here: Array) -> Obstacle:
     if isinstance(obstacle, Cone):
         direction = here[:3, :3].T @ np.asarray(obstacle.direction, dtype=float)
         return replace(obstacle, direction=(float(direction[0]), float(direction[1]), float(direction[2])))
-    d = len(obstacle.center)
-    center = np.linalg.solve(here, np.append(np.asarray(obstacle.center, dtype=float), 1.0))[:d]
-    return replace(obstacle, center=tuple(map(float, center)))
+    if isinstance(obstacle, Cylinder):
+        return replace(obstacle, start=_moved(here, obstacle.start), end=_moved(here, obstacle.end))
+    moved = replace(obstacle, center=_moved(here, obstacle.center))
+    if not isinstance(moved, Box):
+        return moved
+    return replace(moved, axes=here[:-1, :-1].T @ moved.solid().axes[0])
+
+
+def _moved(here: Array, point: Sequence[float]) -> tuple[float, ...]:
+    """A point as it is seen from there."""
+    return tuple(map(float, np.linalg.solve(here, np.append(np.asarray(point, dtype=float), 1.0))[:-1]))

@@ -41,12 +41,103 @@ def pierced() -> list[Any]:
 
 def test_gaps_change_as_their_matrices_say() -> None:
     se3, rng = lc.group("se3"), np.random.default_rng(0)
-    keep_out = KeepOut.of(4, [lc.Cone((1, 2, 0), (0, 1, 1), 0.4), lc.Ball((1, 0, 2), 0.3)])
+    axes = expm(lc.group("so3").hat(rng.normal(size=3)))
+    keep_out = KeepOut.of(
+        4,
+        [
+            lc.Cone((1, 2, 0), (0, 1, 1), 0.4),
+            lc.Box((-1, 2, 0.5), (0.2, 0.5, 1), axes),
+            lc.Ball((1, 0, 2), 0.3),
+            lc.Cylinder((0, 0, 1), (1, 1, 3), 0.4),
+        ],
+    )
     X, eta, e = expm(se3.hat(rng.normal(size=6))), se3.hat(rng.normal(size=6)), 1e-6
-    gap, N = keep_out.nearest(X, np.zeros(2), 2)
+    gap, N = keep_out.nearest(X, np.zeros(4), 4)
     change = (keep_out.gaps(expm(e * eta) @ X) - keep_out.gaps(expm(-e * eta) @ X)) / (2 * e)
     np.testing.assert_allclose(sorted(gap), sorted(keep_out.gaps(X)), atol=1e-14)
     np.testing.assert_allclose(sorted(np.einsum("oij,ij->o", N, eta)), sorted(change), atol=1e-8)
+
+
+def test_distances_to_solids_are_those_to_points_of_their_surfaces() -> None:
+    rng = np.random.default_rng(2)
+    turn = expm(lc.group("so3").hat(rng.normal(size=3)))
+    halves = np.array([0.3, 0.7, 1.1])
+    faces = []
+    for k in range(3):
+        for sign in (-1, 1):
+            q = rng.uniform(-halves, halves, (20_000, 3))
+            q[:, k] = sign * halves[k]
+            faces.append(q)
+    around = rng.uniform(0, 2 * np.pi, 30_000)
+    mantle = np.column_stack([0.4 * np.cos(around), 0.4 * np.sin(around), rng.uniform(-1, 1, 30_000)])
+    lids = mantle * np.column_stack([np.sqrt(rng.uniform(0, 1, 30_000))] * 2 + [np.zeros(30_000)])
+    lids[:, 2] = np.sign(mantle[:, 2])
+    caps = rng.normal(size=(30_000, 3))
+    caps *= 0.4 / np.linalg.norm(caps, axis=1)[:, None]
+    caps[:, 2] += np.sign(caps[:, 2])
+    center = np.array([1.0, -2.0, 0.5])
+    ends = tuple(center - turn[:, 2]), tuple(center + turn[:, 2])
+    X = np.tile(np.eye(4), (60, 1, 1))
+    own = rng.uniform(-1.8, 1.8, (60, 3))
+    X[:, :3, 3] = center + own @ turn.T
+    off = np.linalg.norm(own[:, :2], axis=1)
+    cases = [
+        (lc.Box(center, halves, turn), np.concatenate(faces), np.all(np.abs(own) < halves, axis=1)),
+        (lc.Cylinder(*ends, 0.4), np.concatenate([mantle, lids]), (off < 0.4) & (np.abs(own[:, 2]) < 1)),
+        (
+            lc.Cylinder(*ends, 0.4, rounded=True),
+            np.concatenate([mantle, caps]),
+            np.hypot(off, np.maximum(np.abs(own[:, 2]) - 1, 0)) < 0.4,
+        ),
+    ]
+    for solid, surface, inside in cases:
+        far = np.min(np.linalg.norm(own[:, None] - surface, axis=2), axis=1)
+        np.testing.assert_allclose(solid.clearance(X), np.where(inside, -far, far), atol=0.03)
+        assert 0 < np.sum(inside) < 60
+
+
+def test_a_thin_wall_is_gone_around_and_not_jumped_through() -> None:
+    goal = np.eye(3)
+    goal[0, 2] = 4
+    wall = lc.Box((2.0, 0.3), (0.1, 1.0))
+    plan = lc.steer("se2", goal, ("omega", "vx"), 6.0, method="direct", obstacles=[wall])
+    X = flown(plan)
+    np.testing.assert_allclose(X[-1], goal, atol=1e-7)
+    assert np.min(wall.clearance(X)) > -1e-7
+    assert plan.cost < 4.1
+    seen = lc.steer("se2", X[10], ("omega", "vx"), 0.5, start=X[0], obstacles=[wall])
+    assert seen.error < 1e-6
+
+
+def test_least_time_around_a_disc_is_little_more_than_the_shortest_way() -> None:
+    """The way of a taut string: two tangents and an arc of the disc; a car of unit speed has to turn at both ends as well."""
+    goal, disc = np.eye(3), lc.Ball((2.0, 0.1), 0.8)
+    goal[0, 2] = 4
+    plan = lc.steer(
+        "se2", goal, ("omega",), 6.0, method="direct", objective="time", drift=(0, 1, 0), bounds=1, obstacles=[disc]
+    )
+    away = np.hypot(2, 0.1)
+    string = 2 * np.sqrt(away**2 - 0.64) + 0.8 * (np.pi - 2 * np.arctan(0.05) - 2 * np.arccos(0.8 / away))
+    assert string <= plan.duration <= 1.02 * string
+    X = flown(plan, lambda s: np.array([0, 1.0, 0]))
+    np.testing.assert_allclose(X[-1], goal, atol=1e-6)
+    assert np.min(disc.clearance(X)) > -1e-6
+    assert max(plan.details["control_peaks"]) <= 1
+
+
+@pytest.mark.slow
+def test_least_fuel_around_a_disc_takes_less_than_least_energy_does() -> None:
+    goal, disc = np.eye(3), lc.Ball((2.0, 0.1), 0.8)
+    goal[0, 2] = 4
+    energy, fuel = (
+        lc.steer("se2", goal, ("omega", "vx"), 6.0, method="direct", objective=what, bounds=1, obstacles=[disc])
+        for what in ("energy", "fuel")
+    )
+    t = np.linspace(0, 6, 6001)
+    assert fuel.cost < np.mean(np.sum(np.abs(energy.inputs(t)), axis=1)) * 6 - 0.01
+    X = flown(fuel)
+    np.testing.assert_allclose(X[-1], goal, atol=1e-6)
+    assert np.min(disc.clearance(X)) > -1e-6
 
 
 def test_a_step_is_that_of_the_quadratic_program() -> None:
@@ -54,7 +145,7 @@ def test_a_step_is_that_of_the_quadratic_program() -> None:
     box = Box(-np.full(8, 0.7), np.full(8, 0.7), rng.uniform(0.5, 2, 8), np.ones(8))
     u, J, A = rng.uniform(-0.5, 0.5, 8), rng.normal(size=(2, 8)), rng.normal(size=(5, 8))
     r, gap, rho = 0.1 * rng.normal(size=2), rng.uniform(-0.1, 0.2, 5), 0.3
-    v = _proximal(box, u, r, J, gap, A, rho)
+    v = _proximal(box, False, u, r, J, gap, A, rho)
     found = minimize(
         lambda v: 0.5 * np.sum(box.weight * v**2) + rho / 2 * np.sum((v - u) ** 2), u, method="SLSQP",
         bounds=[(-0.7, 0.7)] * 8, options={"ftol": 1e-14, "maxiter": 500},
@@ -110,7 +201,7 @@ def test_vectors_as_controls_and_a_drift_of_time_go_around_a_disc() -> None:
 def test_what_the_direct_method_has_not_among_obstacles_is_refused() -> None:
     se2 = lc.group("se2")
     given: dict[str, Any] = {"method": "direct", "obstacles": [lc.Ball((2.0, 0.0), 0.5)]}
-    for more in ({"objective": "fuel"}, {"equation": "right"}, {"pieces": 20}):
+    for more in ({"equation": "right"}, {"pieces": 20}, {"objective": "time"}):
         with pytest.raises(lc.errors.SteeringInputError, match="obstacles"):
             lc.steer(se2, (0, 4.0, 0), ("omega", "vx"), 4.0, **given, **more)
     with pytest.raises(lc.errors.SteeringError, match="target itself is inside obstacle 1"):

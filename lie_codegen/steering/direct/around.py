@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.errors import InfeasibleError, SteeringError, SteeringInputError
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.programme import Settings
 from lie_codegen.steering.direct.report import plan_of
 from lie_codegen.steering.direct.scene import CLEAR, ENOUGH, STRAIGHT, Result, Scene
@@ -36,12 +37,15 @@ def around(
     iterations: int,
     seed: int,
     guesses: Array | None,
+    objective: str,
+    longest: float,
     say: Callable[[str], None],
 ) -> Plan:
     """The cheapest plan that stays clear of the obstacles; every class of ways that was found is in details["classes"].
 
     Raises:
-        SteeringInputError: a right-invariant system.
+        SteeringInputError: a right-invariant system; of least time, no bounds, a system that depends on time or a coset.
+        InfeasibleError: proved, obstacles or not.
         SteeringError: an end inside an obstacle; nothing was found, which proves nothing.
     """
     began = time.perf_counter()
@@ -50,9 +54,20 @@ def around(
         raise SteeringInputError(f'{where}: obstacles are looked at along X\' = X hat(u), equation="left"')
     keep_out = KeepOut.of(task.system.group.degree, obstacles)
     _refuse_blocked(task, keep_out, obstacles, where)
-    scene = Scene(
-        task, keep_out, tuple(obstacles), Settings(False, iterations, iterations, enough=ENOUGH, relative=1e-6)
+    proof = None if objective == "time" else certificate(task)
+    if proof is not None:
+        raise InfeasibleError(f"{where}: infeasible even without obstacles: {proof}", certificate=proof)
+    timed = objective == "time"
+    if timed:
+        _refuse_endless(task, where)
+    settings = Settings(
+        objective in ("fuel", "time"),
+        iterations,
+        0 if objective == "none" else iterations,
+        enough=ENOUGH,
+        relative=1e-6,
     )
+    scene = Scene(task, keep_out, tuple(obstacles), settings, objective, longest if timed else 0.0)
     tried: list[str] = []
     found: list[Result] = []
     total = 0
@@ -74,14 +89,14 @@ def around(
         "starts": total,
         "reached": len(good),
         "seed": seed,
-        "objective": "energy",
+        "objective": objective,
     }
     took = {"solve": time.perf_counter() - began}
     if not good:
         nearest = min(found, key=lambda each: max(each.off, -each.clearance))
         details |= {"agree": 0, "violation": {"end": nearest.off, "clearance": max(0.0, -nearest.clearance)}}
         plan = plan_of(
-            task, target, nearest.flown, nearest.variant, tolerance, "energy", details, took, Status.NOT_FOUND
+            task, target, nearest.flown, nearest.variant, tolerance, objective, details, took, Status.NOT_FOUND
         )
         raise SteeringError(
             f"{where}: not found, which proves nothing: the nearest of {total} starts ends {nearest.off:.3g} from the goal and cuts an obstacle "
@@ -94,14 +109,26 @@ def around(
     details |= {
         "winner": f"direct from {best.name}",
         "agree": sum(each.cost <= best.cost * 1.01 for each in good),
-        "discretisation": f"continuous controls, linear on {len(best.flown.inputs.first)} pieces",
+        "discretisation": f"{'continuous controls, linear on' if scene.linear else 'controls constant on'} "
+        f"{len(best.flown.inputs.first)} pieces",
         "clearances": scene.clearances(best.flown),
         "classes": scene.named(good),
         "optimality": f"a local minimum, the cheapest of {len(good)} that were refined",
     }
     if task.end.phases:
         details["phase"] = task.end.phases[best.variant]
-    return plan_of(task, target, best.flown, best.variant, tolerance, "energy", details, took)
+    return plan_of(task, target, best.flown, best.variant, tolerance, objective, details, took)
+
+
+def _refuse_endless(task: Manoeuvre, where: str) -> None:
+    """Of least time: controls without bounds have none, and what depends on time has no unit of it."""
+    if not np.all(np.isfinite(task.low)) or not np.all(np.isfinite(task.high)):
+        raise SteeringInputError(f'{where}: objective="time" among obstacles needs bounds on every control')
+    if not task.system.steady or any(task.free_slots):
+        raise SteeringInputError(
+            f'{where}: objective="time" among obstacles by method="direct" needs controls and a drift that do not depend on time, and a goal '
+            'that is an element, a Pointing or a Position; method="transcription" takes a Coset'
+        )
 
 
 def _refuse_blocked(task: Manoeuvre, keep_out: KeepOut, obstacles: Sequence[Obstacle], where: str) -> None:

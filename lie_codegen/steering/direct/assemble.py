@@ -80,13 +80,13 @@ class Manoeuvre:
         return sides[0], sides[1]
 
 
-def constant_pieces(task: Manoeuvre, pieces: int) -> Programme:
-    """Controls constant on equal pieces."""
+def constant_pieces(task: Manoeuvre, pieces: int, steps: int = 1) -> Programme:
+    """Controls constant on equal pieces; where nothing depends on time each is as many exponentials as there are steps."""
     h = task.duration / pieces
     if task.system.steady:
         drifts, directions = _sampled(task, np.zeros(1))
-        table = (h * drifts, h * directions, np.zeros(pieces, int))
-        slot, share = np.arange(pieces), np.tile([1.0, 0.0], (pieces, 1))
+        table = (h / steps * drifts, h * directions, np.zeros(pieces * steps, int))
+        slot, share = np.repeat(np.arange(pieces), steps), np.tile([1.0 / steps, 0.0], (pieces * steps, 1))
     else:
         rows, slot, share = [], np.repeat(np.arange(pieces), 2), np.tile([0.5, 0.0], (2 * pieces, 1))
         for k in range(pieces):
@@ -95,10 +95,11 @@ def constant_pieces(task: Manoeuvre, pieces: int) -> Programme:
     return programme_of(task, table, slot, share, np.ones(pieces))
 
 
-def linear_pieces(task: Manoeuvre, pieces: int, speed: float) -> Programme:
-    """Controls linear between equidistant nodes; `speed`: norm of the velocity, for the length of steps."""
+def linear_pieces(task: Manoeuvre, pieces: int, speed: float, steps: int = 1) -> Programme:
+    """Controls linear between equidistant nodes; `speed`: norm of the velocity, for the length of steps, of which there are `steps` at
+    least."""
     h = task.duration / pieces
-    steps = int(np.clip(math.ceil(h * speed / _STEP), 1, _MOST_STEPS))
+    steps = max(steps, int(np.clip(math.ceil(h * speed / _STEP), 1, _MOST_STEPS)))
     slot = np.repeat(np.arange(pieces), 2 * steps)
     shares = []
     for step in range(steps):

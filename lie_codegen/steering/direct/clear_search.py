@@ -6,6 +6,7 @@ of stage 2 solves
     min objective(v) + rho/2 |v - u|^2   with   J v = J u - r,   gap + A (v - u) >= margin,   low <= v <= high
 
 by projected Newton steps on its dual, whose unknowns are the goal's n rows and one for each gap in sight; then a few steps of stage 1.
+Of least time the duration is one more unknown: all velocities are multiplied by it, in units of the given one.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ _NEAREST = 2
 _NEWTON, _HALVINGS = 40, 12
 _ROUNDING = 1e-11
 _ARRIVE = 8
+#: Where chords between nodes are looked at, and how deep in an obstacle they are a way through it, in units of its size.
+_ALONG, _THROUGH = (0.2, 0.35, 0.5, 0.65, 0.8), 0.7
+#: Least duration, in units of the given one.
+_SHORTEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +54,7 @@ class Course:
         first: number of the first exponential that is the system's own.
         nodes: (k,) numbers of own exponentials after which the obstacles are looked at.
         margins: (o,) gaps that must be kept.
+        longest: the duration is the last control of each lane, up to that many times the given one; zero where it is given.
     """
 
     programme: Programme
@@ -58,26 +64,46 @@ class Course:
     first: int
     nodes: Rows
     margins: Array
+    longest: float = 0.0
 
     @property
     def box(self) -> Box:
-        """Limits and weights."""
-        return Box.of(self.programme)
+        """Limits and weights; of least time only the duration has one."""
+        box = Box.of(self.programme)
+        if not self.longest:
+            return box
+        last = (_SHORTEST, self.longest, 1.0, 1.0)
+        parts = (box.low, box.high, 0 * box.weight, box.mass)
+        return Box(*(np.append(part, more) for part, more in zip(parts, last, strict=True)))
+
+    def split(self, u: Array) -> tuple[Array, Array]:
+        """Controls (L, S, m) of lanes, and the durations (L,)."""
+        lanes, shape = len(u), self.programme.low.shape
+        if not self.longest:
+            return u.reshape(lanes, *shape), np.ones(lanes)
+        return u[:, :-1].reshape(lanes, *shape), u[:, -1]
 
     def states(self, u: Array) -> tuple[Array, Array]:
-        """States (L, K + 1, d, d) along the way, and the matrices eta (L, K, m, d, d) by which u_ki moves all later ones: exp(eta) X."""
+        """States (L, K + 1, d, d) along the way, and the matrices eta (L, K, m, d, d) by which u_ki moves all later ones: exp(eta) X.
+
+        Of least time the last of the m + 1 matrices belong to the duration, which moves the states after each exponential.
+        """
         p = self.programme
         lanes = len(u)
-        controls = u.reshape(lanes, *p.low.shape)
+        controls, lasting = self.split(u)
         own = slice(self.first, self.first + len(self.own_slots))
         entry = p.entry[0, own]
         slot, share = p.slot[own], p.share[own]
         b = p.directions[entry]
         after = np.minimum(slot + 1, controls.shape[1] - 1)
         driven = share[:, :1] * controls[:, slot] + share[:, 1:] * controls[:, after]
-        E, dE = exponentials(
-            p.drifts[entry] + np.einsum("lki,kixy->lkxy", driven, b), np.broadcast_to(b, (lanes, *b.shape))
-        )
+        velocity = p.drifts[entry] + np.einsum("lki,kixy->lkxy", driven, b)
+        slopes = np.broadcast_to(b, (lanes, *b.shape))
+        if self.longest:
+            by = lasting[:, None, None, None]
+            slopes = np.concatenate([by[..., None] * slopes, velocity[:, :, None]], axis=2)
+            velocity = by * velocity
+        E, dE = exponentials(velocity, slopes)
         X = np.empty((lanes, len(entry) + 1, *self.start.shape), E.dtype)
         X[:, 0] = self.start
         for k in range(len(entry)):
@@ -113,12 +139,15 @@ class Course:
         """Derivatives (L, R, K, m) by what drives each own exponential as those by the controls, (L, R, C)."""
         p, count = self.programme, rows.shape[2]
         own = slice(self.first, self.first + count)
+        if self.longest:
+            rows, lasting = rows[..., :-1], np.sum(rows[..., -1], axis=2)
         by_slot = np.zeros((count, p.low.shape[0]))
         by_slot[np.arange(count), p.slot[own]] += p.share[own, 0]
         ahead = np.minimum(p.slot[own] + 1, p.low.shape[0] - 1)
         by_slot[np.arange(count), ahead] += p.share[own, 1]
         found = np.einsum("lrkm,ks->lrsm", rows, by_slot, optimize=True)
-        return np.asarray(found.reshape(*found.shape[:2], -1))
+        found = found.reshape(*found.shape[:2], -1)
+        return np.asarray(np.concatenate([found, lasting[..., None]], axis=2) if self.longest else found)
 
     def known(self, u: Array) -> Known:
         """What a step needs at controls u (L, C)."""
@@ -127,7 +156,7 @@ class Course:
         gap, A = self._gaps(X, eta)
         goal = replace(self.goal, value=np.repeat(self.goal.value, lanes, axis=0))
         if self.free:
-            full, r, J = linearise(self.programme, goal, u.reshape(lanes, *self.programme.low.shape))
+            full, r, J = linearise(self.programme, goal, self.split(u)[0])
         else:
             full, reduce = residual(self.programme.basis, goal, X[:, -1])
             moved = goal.left @ eta @ (X[:, -1] @ goal.right)[:, None, None]
@@ -135,6 +164,17 @@ class Course:
             r = np.einsum("lnq,lq->ln", reduce, full)
         size = np.sqrt(np.sum(full**2, axis=1) + np.sum(np.minimum(gap, 0.0) ** 2, axis=1))
         return Known(np.where(np.isfinite(size), size, np.inf), *(np.nan_to_num(each) for each in (r, J, gap, A)))
+
+    def jumps(self, u: Array) -> Array:
+        """(L,) whether a lane (L, C) goes through an obstacle in one step, clear before and behind it: past the middle of the thinnest
+        part. What a chord cuts off at an edge or a rim is less than that, and margins mend it."""
+        X, _ = self.states(u)
+        nodes = np.real(X[:, np.concatenate([[0], 1 + self.nodes])])
+        found = np.zeros(len(u), bool)
+        for s in _ALONG:
+            gap = self.keep_out.gaps(nodes[:, :-1] + s * np.diff(nodes, axis=1))
+            found |= np.any(gap < -_THROUGH * self.keep_out.sizes, axis=(1, 2))
+        return found
 
     def look(self, _: Rows, u: Array) -> Lanes:
         """The goal's rows and those of the nodes that cut an obstacle, as `numpy_search` asks for them."""
@@ -152,16 +192,16 @@ def arrive(course: Course, u: Array, settings: Settings) -> tuple[Array, Array]:
 def cheaper(course: Course, u: Array, settings: Settings) -> tuple[Array, float, int]:
     """Controls (C,) that reach the goal and stay clear as u does, at less cost; the cost, and steps taken."""
     box, enough = course.box, 100 * settings.enough
-    best = float(box.objective(False, u[None])[0])
+    best = float(box.objective(settings.fuel, u[None])[0])
     at = course.known(u[None])
     rho, quiet, steps = 1.0, 0, 0
     restoring = Settings(reach_iterations=_ARRIVE, enough=settings.enough, damping=1e-9)
     while steps < settings.descend_iterations and quiet < 3 and rho < 1e5:
         steps += 1
-        v = _proximal(box, u, at.r[0], at.J[0], at.gap[0], at.A[0], rho)
+        v = _proximal(box, settings.fuel, u, at.r[0], at.J[0], at.gap[0], at.A[0], rho)
         trial, off = arrive(course, v[None], restoring)
-        cost = float(box.objective(False, trial)[0])
-        if off[0] < enough and cost < best:
+        cost = float(box.objective(settings.fuel, trial)[0])
+        if off[0] < enough and cost < best and not course.jumps(trial)[0]:
             quiet = quiet + 1 if best - cost <= settings.relative * best else 0
             u, best = trial[0], cost
             at = course.known(trial)
@@ -171,20 +211,22 @@ def cheaper(course: Course, u: Array, settings: Settings) -> tuple[Array, float,
     return u, best, steps
 
 
-def _proximal(box: Box, u: Array, r: Array, J: Array, gap: Array, A: Array, rho: float) -> Array:
+def _proximal(box: Box, fuel: bool, u: Array, r: Array, J: Array, gap: Array, A: Array, rho: float) -> Array:
     """The step's controls: the dual is concave with a continuous gradient; z >= 0 belongs to the gaps."""
     n = len(r)
     mass = box.mass
     G = np.concatenate([J, A])
     want = np.concatenate([J @ u - r, A @ u - gap])
-    rate = 1 / (box.weight + rho)
+    rate, shift = (1 / rho, box.weight / rho) if fuel else (1 / (box.weight + rho), 0.0)
     limit = np.concatenate([np.full(n, -np.inf), np.zeros(len(gap))])
 
     def primal(y: Array) -> tuple[Array, Array, float, Array]:
-        v = np.clip((G.T @ y / mass + rho * u) * rate, box.low, box.high)
+        z = (G.T @ y / mass + rho * u) * rate
+        v = np.clip(np.sign(z) * np.maximum(np.abs(z) - shift, 0.0), box.low, box.high)
         g = want - G @ v
-        value = 0.5 * float(mass @ (box.weight * v * v + rho * (v - u) ** 2)) + float(y @ g)
-        inside = np.where((v > box.low) & (v < box.high), rate, 0.0)
+        size = box.weight * (2 * np.abs(v) if fuel else v * v)
+        value = 0.5 * float(mass @ (size + rho * (v - u) ** 2)) + float(y @ g)
+        inside = np.where((v > box.low) & (v < box.high) & (np.abs(z) >= shift), rate, 0.0)
         return v, g, value, inside
 
     y = np.zeros(len(want))

@@ -21,8 +21,8 @@ _IDLE = {
         "beside spread=, whose controls have least squared errors; leave it away",
     ),
     "obstacles": (
-        ("spread", "pieces", "polish", "vertices", "longest"),
-        "beside obstacles=, around which the controls are linear on 64 pieces; leave it away",
+        ("spread", "pieces", "polish", "vertices"),
+        "beside obstacles=, around which there are 64 pieces; leave it away",
     ),
 }
 
@@ -71,9 +71,13 @@ def _refuse_others(what: str, known: set[str], options: Mapping[str, Any]) -> No
 
 def _refuse_idle(where: str, options: Mapping[str, Any]) -> None:
     """Least time starts from words of arcs, and a spread has one sum of squares: what only the other searches read is refused."""
+    timed, among = options.get("objective") == "time", bool(options.get("obstacles"))
+    there = {"time": timed and not among, "spread": "spread" in options, "obstacles": among}
     for asked, (idle, instead) in _IDLE.items():
         stray = [name for name in idle if name in options]
-        if stray and (options.get("objective") == "time" if asked == "time" else asked in options):
+        if among and asked == "obstacles" and ("weights" if timed else "longest") in options:
+            stray.append("weights" if timed else "longest")
+        if stray and there[asked]:
             raise SteeringInputError(f"{where}: {', '.join(stray)} has no effect {instead}")
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from lie_codegen.errors import InfeasibleError, SteeringInputError
+from lie_codegen.errors import InfeasibleError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.steering.constraints import Obstacle, check_obstacles
 from lie_codegen.steering.direct.around import around
@@ -85,7 +85,7 @@ def direct(
         polish: whether the controls become continuous (energy); else they stay constant on each piece. Where not given, they do on
             groups of up to 20 dimensions.
         longest: for "time": the longest duration allowed, in units of the given one.
-        obstacles: `Cone`s and `Ball`s to keep out of, "energy" alone.
+        obstacles: `Cone`s, `Ball`s, `Box`es and `Cylinder`s to keep out of.
         classes: classes of ways around them that are tried.
         vertices: for "time": the (k, m) control vectors that arcs take, where the controls are not free in a box: (omega, v) = (+-1, +-1),
             (0, +-1) is the car of Reeds and Shepp, whose turning rate is bounded by its speed. Box vertices and zeros if not given.
@@ -101,18 +101,14 @@ def direct(
     began = time.perf_counter()
     check_options(objective, equation, starts, rounds, pieces, iterations, tolerance)
     task = manoeuvre(group, target, controls, duration, drift, bounds, weights, start, equation)
-    if obstacles and objective != "energy":
-        raise SteeringInputError(
-            f'steer({group.name}): method="direct" goes around obstacles at least energy; objective={objective!r} beside them is for '
-            "method='transcription' (\"time\") or without them"
-        )
+    count = piece_count(task) if pieces is None else pieces
+    if obstacles is not None and len(checked := check_obstacles(group, obstacles)):
+        return around(
+            task, target, checked, classes, tolerance, starts, rounds, iterations, seed, guessed(task, guess, count), objective, longest, say
+        )  # fmt: skip
     if objective == "time":
         limits = Settings(True, iterations, iterations)
         return least_time(task, target, tolerance, limits, starts, rounds, seed, longest, say, vertices)
-    count = piece_count(task) if pieces is None else pieces
-    if obstacles is not None and len(checked := check_obstacles(group, obstacles)):
-        guesses = guessed(task, guess, count)
-        return around(task, target, checked, classes, tolerance, starts, rounds, iterations, seed, guesses, say)
     if spread is not None:
         guesses = guessed(task, guess, count)
         return robust(task, target, tolerance, spread, starts, count, iterations, seed, guesses, say)

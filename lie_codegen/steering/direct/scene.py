@@ -11,14 +11,16 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.constraints import Obstacle
-from lie_codegen.steering.direct.assemble import Manoeuvre, linear_pieces
+from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.clear_search import Course, arrive, cheaper
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.inputs import Drive
 from lie_codegen.steering.direct.magnus_flow import states_reached
 from lie_codegen.steering.direct.numpy_search import Lanes, Rows, reach
 from lie_codegen.steering.direct.polish import Flown, corrected
+from lie_codegen.steering.direct.polish import flown as as_flown
 from lie_codegen.steering.direct.programme import Settings
+from lie_codegen.steering.direct.report import cost_of
 from lie_codegen.steering.direct.starts import starts as first_controls
 from lie_codegen.steering.direct.starts import with_free_slots
 from lie_codegen.steering.obstacles.homotopy import Discs, planar_discs, resampled, shortest_classes
@@ -37,9 +39,13 @@ _ALIKE = 1e-3
 _FOLLOW, _FOLLOWING = 0.2, 25
 #: Residual at which controls are there and clear.
 ENOUGH = 1e-9
-_WIDER, _AGAIN = 1.2, 6
+_WIDER, _AGAIN = 1.4, 8
+#: Steps of a descent after margins were widened.
+_LATER = 15
 #: Largest motion between two looks, in units of the smallest obstacle; parts of a piece, at most.
 _LOOK, _MOST_PARTS = 0.05, 64
+#: Steps of a piece, at most, and how long they are with those, in units of the thinnest obstacle's size: obstacles are looked at after each.
+_STEPS, _APART = 8, 1.0
 #: Depth in an obstacle that is rounding.
 CLEAR = 1e-7
 
@@ -65,13 +71,27 @@ class Scene:
     keep_out: KeepOut
     obstacles: tuple[Obstacle, ...]
     settings: Settings
+    objective: str = "energy"
+    longest: float = 0.0
+
+    @property
+    def linear(self) -> bool:
+        """Whether controls are linear between nodes, else constant on pieces: those of least energy have no jumps."""
+        return self.objective in ("energy", "none")
+
+    @cached_property
+    def travel(self) -> float:
+        """How far what obstacles look at is from where it must be: the length of a short way."""
+        goals = [self.goal_state(variant) for variant in range(len(self.task.end.values))]
+        known = [each for each in goals if each is not None]
+        axes = self.keep_out.axes
+        away = [np.linalg.norm((each - np.real(self.task.system.start)) @ axes.T, axis=0) for each in known]
+        return float(np.max(away, initial=0.0))
 
     @cached_property
     def discs(self) -> Discs | None:
         """The obstacles as discs, where all of them are."""
-        return (
-            planar_discs(self.obstacles) if self.task.system.group.degree == 3 and np.all(self.keep_out.balls) else None
-        )
+        return planar_discs(self.obstacles) if self.task.system.group.degree == 3 else None
 
     def goal_state(self, variant: int) -> Array | None:
         """A state at the goal: one of many where it leaves motions free; None where only a part of it is known."""
@@ -89,21 +109,26 @@ class Scene:
         self, classes: int, seed: int, variant: int, straight: int, guesses: Array | None
     ) -> tuple[Array, list[str]]:
         """First controls on the coarse pieces (L, C), and where each comes from."""
-        nodes = _COARSE + 1
+        nodes = _COARSE + self.linear
         u = with_free_slots(self.task, first_controls(self.task, nodes, straight, seed, 0), seed)
-        flat = u.reshape(len(u), -1)
+        flat = self.lasting(u)
         lanes, names = [flat], [f"start {number}" for number in range(1, len(u) + 1)]
         if guesses is not None:
             given = np.stack([_stretched(each, nodes) for each in guesses])
-            lanes.append(with_free_slots(self.task, given, seed).reshape(len(given), -1))
+            lanes.append(self.lasting(with_free_slots(self.task, given, seed)))
             names += ["the guess given"] * len(given)
         course = self.course(_COARSE, variant)
         for number, way in enumerate(self.ways(classes, seed, variant), start=1):
             again = first_controls(self.task, nodes, _EACH, seed, number)
-            begin = with_free_slots(self.task, again, seed).reshape(_EACH, -1)
+            begin = self.lasting(with_free_slots(self.task, again, seed))
             lanes.append(self.following(course, way, begin))
             names += [f"way {number}"] * _EACH
         return np.concatenate(lanes), names
+
+    def lasting(self, u: Array) -> Array:
+        """Controls (L, S, m) as lanes (L, C), with a duration each where the least is sought."""
+        flat = u.reshape(len(u), -1)
+        return np.concatenate([flat, np.ones((len(u), 1))], axis=1) if self.longest else flat
 
     def ways(self, classes: int, seed: int, variant: int) -> list[Places]:
         """Ways around the obstacles, the shortest first."""
@@ -117,16 +142,20 @@ class Scene:
         return ways(Space.between(self.keep_out, start, goal), classes, seed)
 
     def course(self, pieces: int, variant: int, margins: Array | None = None) -> Course:
-        """The programme of that many linear pieces among the obstacles."""
+        """The programme of that many pieces among the obstacles."""
         task = self.task
         speed = 4.0 / task.duration  # steps follow the flight that corrects; the search needs no more
-        programme = linear_pieces(task, pieces, speed)
+        steps = int(np.clip(np.ceil(_APART * self.travel / (pieces * np.min(self.keep_out.sizes))), 1, _STEPS))
+        programme = linear_pieces(task, pieces, speed, steps) if self.linear else constant_pieces(task, pieces, steps)
         first, last = task.free_slots
         own = len(programme.slot) - first - last
-        nodes = np.arange(1, own, 2)  # two exponentials make a step
-        given = np.zeros(len(self.obstacles)) if margins is None else margins
+        # two exponentials make a step, and one where nothing changes on it
+        nodes = np.arange(1, own, 2) if self.linear or not task.system.steady else np.arange(own)
+        # an obstacle thinner than a step is long would be jumped over: it counts as thick as that
+        thin = np.maximum(0.0, _APART * self.travel / len(nodes) - self.keep_out.sizes) * self.keep_out.placed
+        given = thin if margins is None else np.maximum(thin, margins)
         goal = task.goal(np.array([variant]))
-        return Course(programme, goal, self.keep_out, task.system.start, first, nodes, given)
+        return Course(programme, goal, self.keep_out, task.system.start, first, nodes, given, self.longest)
 
     def following(self, course: Course, way: Places, u: Array) -> Array:
         """Controls (L, C) that end at the goal, as near to the way as they can."""
@@ -165,11 +194,11 @@ class Scene:
         """Results of lanes that arrive, the cheapest of each origin refined; how many arrived."""
         coarse = self.course(_COARSE, variant)
         u, off = arrive(coarse, lanes, self.settings)
-        there = np.flatnonzero(off <= 100 * ENOUGH)
+        there = np.flatnonzero((off <= 100 * ENOUGH) & ~coarse.jumps(u))
         if not len(there):
             lane = int(np.argmin(off))
             return [self.refined(u[lane], variant, names[lane])], 0
-        cost = coarse.box.objective(False, u)
+        cost = coarse.box.objective(self.settings.fuel, u)
         order = there[np.argsort(cost[there], kind="stable")]
         # the cheapest of each way, and the cheapest of those that went by none
         origins: dict[str, list[int]] = {}
@@ -191,46 +220,65 @@ class Scene:
 
     def refined(self, u: Array, variant: int, name: str) -> Result:
         """On the fine pieces, with margins where the true system cuts an obstacle between the nodes."""
-        task = self.task
-        coarse = u.reshape(-1, task.controls)
-        before, after = task.free_slots
-        own = _stretched(task.own(coarse), _FINE + 1)
-        v = np.concatenate([coarse[:before], own, coarse[len(coarse) - after :]]).ravel()
+        v = self._finer(u)
         margins = np.zeros(len(self.obstacles))
-        solver = machine(task.system.group, task.controls)
         best: Result | None = None
         for number in range(_AGAIN):
             course = self.course(_FINE, variant, margins)
             v, _ = (each[0] for each in arrive(course, v[None], self.settings))
-            limit = self.settings if number == 0 else replace(self.settings, descend_iterations=15)
+            limit = (
+                self.settings
+                if number == 0
+                else replace(self.settings, descend_iterations=min(_LATER, self.settings.descend_iterations))
+            )
             v, _, _ = cheaper(course, v, limit)
-            shape = v.reshape(-1, task.controls)
-            shape, flown = corrected(task, solver, course.programme, shape, variant, True, self.settings)
-            v = shape.ravel()
+            v, task, flown = self._confirmed(course, v, variant)
             X = self.flight(flown)
-            gaps = np.min(self.keep_out.gaps(X), axis=0)
+            gaps = _least(self.keep_out.gaps(X))
             through = tunnels(self.obstacles, X)
             clearance = -1.0 if through else float(np.min(gaps))
             way = seen(self.keep_out, X[np.linspace(0, len(X) - 1, 129).round().astype(int)])
-            cost = flown.inputs.integral_of_squares(task.weights)
-            now = Result(flown, variant, cost, clearance, flown.miss, way, name)
+            now = Result(flown, variant, cost_of(task, flown.inputs, self.objective), clearance, flown.miss, way, name)
             if best is None or min(now.clearance, 0.0) > min(best.clearance, 0.0):
                 best = now
             if clearance >= -CLEAR or through:
                 break
-            margins = margins + np.where(gaps < 0, -_WIDER * gaps + CLEAR, 0.0)
+            # nodes slide along an edge as long as they gain by it: what is left is widened by more each time
+            margins = margins + np.where(gaps < 0, -(_WIDER ** (1 + number)) * gaps + CLEAR, 0.0)
         if best is None:
             raise ValueError("no round was made")
         return best
 
+    def _finer(self, u: Array) -> Array:
+        """Controls (C,) of the coarse pieces on the fine ones."""
+        task = self.task
+        coarse = (u[:-1] if self.longest else u).reshape(-1, task.controls)
+        before, after = task.free_slots
+        own = task.own(coarse)
+        own = _stretched(own, _FINE + 1) if self.linear else own[np.arange(_FINE) * len(own) // _FINE]
+        fine = np.concatenate([coarse[:before], own, coarse[len(coarse) - after :]]).ravel()
+        return np.append(fine, u[-1]) if self.longest else fine
+
+    def _confirmed(self, course: Course, v: Array, variant: int) -> tuple[Array, Manoeuvre, Flown]:
+        """The controls (C,) so that the true system is at the goal, the task with their duration, and how they were flown."""
+        if self.longest:
+            # arcs of constant velocity: the programme is the system
+            task = replace(self.task, duration=float(v[-1]) * self.task.duration)
+            return v, task, as_flown(task, v[:-1].reshape(-1, task.controls), variant, self.linear)
+        task = self.task
+        solver = machine(task.system.group, task.controls)
+        shape = v.reshape(-1, task.controls)
+        shape, flown = corrected(task, solver, course.programme, shape, variant, self.linear, self.settings)
+        return shape.ravel(), task, flown
+
     def flight(self, flown: Flown) -> Array:
-        """States of the true system, so many that it moves by little between two."""
+        """States of the true system, so many that it moves by little between two, or cannot meet an obstacle there."""
         step = _LOOK * float(np.min(self.keep_out.sizes))
         drive, parts = Drive(self.task.system, flown.inputs), 4
         while True:
             X = np.real(states_reached(drive, parts)[1])
             moved = np.max(np.abs(np.diff(X @ self.keep_out.axes.T, axis=0)), initial=0.0)
-            if moved <= step or parts >= _MOST_PARTS:
+            if moved <= step or parts >= _MOST_PARTS or self.keep_out.cleared(X):
                 return X
             parts *= 2
 
@@ -254,6 +302,15 @@ class Scene:
                 word = f"way {same[0] + 1 if same else len(kept)}"
             best.setdefault(word, {"word": word, "cost": each.cost, "clearance": each.clearance})
         return tuple(best.values())
+
+
+def _least(gaps: Array) -> Array:
+    """(o,) least of gaps (k, o) along a way: between looks by the parabola through the lowest and its neighbours."""
+    before, here, after = gaps[:-2], gaps[1:-1], gaps[2:]
+    bend, slope = before - 2 * here + after, (after - before) / 2
+    lowest = (here <= before) & (here <= after) & (bend > 0)
+    dip = np.where(lowest, slope**2 / (2 * np.maximum(bend, 1e-300)), 0.0)
+    return np.asarray(np.minimum(np.min(here - dip, axis=0), np.minimum(gaps[0], gaps[-1])))
 
 
 def _stretched(values: Array, nodes: int) -> Array:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.steering.constraints import Ball
 
 Word = tuple[int, ...]
 
@@ -208,8 +209,8 @@ def resampled(path: Array, count: int) -> Array:
 
 def planar_discs(obstacles: Sequence[Any]) -> Discs | None:
     """The discs among obstacles of the plane; None where there is none, or an obstacle of another kind."""
-    balls = [each for each in obstacles if len(getattr(each, "center", ())) == 2]
-    if not balls:
+    balls = [each for each in obstacles if isinstance(each, Ball) and len(each.center) == 2]
+    if not balls or len(balls) < len(obstacles):
         return None
     return Discs.of(
         np.array([each.center for each in balls], dtype=float), np.array([float(each.radius) for each in balls])

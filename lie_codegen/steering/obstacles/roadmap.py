@@ -20,8 +20,9 @@ from lie_codegen.on_demand import scipy
 from lie_codegen.steering.obstacles.keep_out import KeepOut
 
 _SAMPLES, _NEIGHBOURS = 700, 12
-#: Points of an edge, of a way that is compared with another, and of a way that is returned.
-_EDGE, _COMPARED, _POINTS = 16, 48, 129
+#: Points of an edge, at least and at most (two for each half thickness of the thinnest obstacle), of a way that is compared with
+#: another, and of a way that is returned.
+_EDGE, _FINEST, _COMPARED, _POINTS = 16, 200, 48, 129
 #: Ways longer than so many times the shortest are not looked at; via points that are tried, at most.
 _LONGEST, _TRIED = 4.0, 120
 _SHORTENINGS = 3
@@ -73,13 +74,13 @@ class Space:
     @property
     def scale(self) -> float:
         """Length that counts as much as a radian."""
-        return max(float(np.linalg.norm(self.goal.p - self.start.p)), 1e-9) if np.any(self.keep_out.balls) else 1.0
+        return max(float(np.linalg.norm(self.goal.p - self.start.p)), 1e-9) if np.any(self.keep_out.placed) else 1.0
 
     def states(self, places: Places) -> Array:
         """(k, d, d) states that look so."""
         d = self.keep_out.degree
         X = np.tile(np.eye(d), (len(places), 1, 1))
-        if not np.all(self.keep_out.balls):
+        if not np.all(self.keep_out.placed):
             X[:, :3, :3] = places.R
         if places.p.shape[1]:
             X[:, :-1, -1] = places.p
@@ -87,13 +88,13 @@ class Space:
 
     def clear(self, places: Places, cut: float = 0.0) -> Array:
         """(k,) whether each is clear of all obstacles, or cuts each by less than a part of its size."""
-        least = -cut * self.keep_out.sizes if cut else np.full(len(self.keep_out.radii), self.margin)
+        least = -cut * self.keep_out.sizes if cut else np.full(len(self.keep_out.columns), self.margin)
         return np.asarray(np.all(self.keep_out.gaps(self.states(places)) > least, axis=-1))
 
     def distances(self, here: Places, there: Places) -> Array:
         """(a, b) between all pairs."""
         far = np.linalg.norm(here.p[:, None] - there.p, axis=2) / self.scale
-        if np.all(self.keep_out.balls):
+        if np.all(self.keep_out.placed):
             return np.asarray(far)
         cosine = (np.einsum("aij,bij->ab", here.R, there.R) - 1) / 2
         return np.asarray(far + np.arccos(np.clip(cosine, -1, 1)))
@@ -101,7 +102,7 @@ class Space:
     def steps(self, way: Places) -> Array:
         """(k - 1,) between neighbours."""
         far = np.linalg.norm(np.diff(way.p, axis=0), axis=1) / self.scale
-        if np.all(self.keep_out.balls):
+        if np.all(self.keep_out.placed):
             return np.asarray(far)
         cosine = (np.einsum("aij,aij->a", way.R[:-1], way.R[1:]) - 1) / 2
         return np.asarray(far + np.arccos(np.clip(cosine, -1, 1)))
@@ -109,7 +110,9 @@ class Space:
     def joins(self, here: Places, there: Places, cut: float = 0.0) -> Array:
         """(k,) whether the geodesic between each pair is clear, or cuts obstacles by less than that."""
         found = np.ones(len(here), bool)
-        for s in np.linspace(0, 1, _EDGE):
+        longest = float(np.max(np.linalg.norm(there.p - here.p, axis=1), initial=0.0))
+        count = int(np.clip(np.ceil(2 * longest / np.min(self.keep_out.sizes)), _EDGE, _FINEST))
+        for s in np.linspace(0, 1, count):
             rows = np.flatnonzero(found)
             if len(rows):
                 found[rows] = self.clear(between(here.at(rows), there.at(rows), np.full(len(rows), s)), cut)
@@ -118,9 +121,9 @@ class Space:
 
 def seen(keep_out: KeepOut, X: Array) -> Places:
     """What the obstacles see of states (k, d, d)."""
-    balls, d = bool(np.any(keep_out.balls)), keep_out.degree
-    R = np.real(X[:, :3, :3]) if not np.all(keep_out.balls) else np.tile(np.eye(3), (len(X), 1, 1))
-    return Places(np.real(X[:, :-1, -1]) if balls else np.zeros((len(X), 0)), R) if d > 1 else Places(X[:, :0, 0], R)
+    placed, d = bool(np.any(keep_out.placed)), keep_out.degree
+    R = np.real(X[:, :3, :3]) if not np.all(keep_out.placed) else np.tile(np.eye(3), (len(X), 1, 1))
+    return Places(np.real(X[:, :-1, -1]) if placed else np.zeros((len(X), 0)), R) if d > 1 else Places(X[:, :0, 0], R)
 
 
 def between(here: Places, there: Places, s: Array) -> Places:
@@ -185,20 +188,24 @@ def _sampled(space: Space, rng: np.random.Generator) -> Places:
     """Clear places: anywhere around start, goal and obstacles, and close to obstacles."""
     keep_out, q = space.keep_out, space.start.p.shape[1]
     parts = [np.concatenate([space.start.p, space.goal.p])]
-    if q:
-        centers, radii = keep_out.centers[keep_out.balls, :-1], keep_out.radii[keep_out.balls]
-        parts += [centers - radii[:, None], centers + radii[:, None]]
+    solids = keep_out.solids
+    if solids is not None:
+        parts += list(solids.corners())
     corners = np.concatenate(parts)
     low, high = (np.min(corners, axis=0), np.max(corners, axis=0)) if q else (np.zeros(0), np.zeros(0))
     room = 0.3 * float(np.max(high - low)) if q else 0.0
     p = rng.uniform(low - room, high + room, (4 * _SAMPLES, q))
-    if q:
-        which = rng.integers(0, len(radii), 2 * _SAMPLES)
+    if solids is not None:
+        which = rng.integers(0, len(solids), 2 * _SAMPLES)
         out = rng.normal(size=(2 * _SAMPLES, q))
         out /= np.linalg.norm(out, axis=1)[:, None]
-        p[::2] = centers[which] + out * (radii[which] * rng.uniform(1.02, 1.6, 2 * _SAMPLES))[:, None]
+        # from a point near the surface along the gradient to a part of the solid's size away from it
+        at = solids.at(which)
+        p[::2] = at.centers + np.einsum("oij,oj->oi", at.axes, out * at.extents)
+        gap, normal = at.seen(p[::2])
+        p[::2] += (at.sizes * rng.uniform(0.02, 0.6, 2 * _SAMPLES) - gap)[:, None] * normal
     w = rng.normal(size=(4 * _SAMPLES, 4))
-    alike = bool(np.all(keep_out.balls))  # no attitude is looked at
+    alike = bool(np.all(keep_out.placed))  # no attitude is looked at
     R = np.tile(np.eye(3), (len(p), 1, 1)) if alike else rotation_from_quaternion(w, order="wxyz")
     places = Places(p, R)
     return places.at(np.flatnonzero(space.clear(places))[:_SAMPLES])

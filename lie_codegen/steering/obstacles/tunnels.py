@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.steering.constraints import Ball
 
 
 def tunnels(obstacles: Sequence[Any], X: Array) -> bool:
     """Whether the positions of X (k, 3, 3) cross the segment between the centres of two discs that overlap or touch."""
-    discs = [each for each in obstacles if len(getattr(each, "center", ())) == 2]
+    discs = [each for each in obstacles if isinstance(each, Ball) and len(each.center) == 2]
     if len(discs) < 2:
         return False
     way = X[:, :2, 2]

@@ -11,7 +11,8 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.flow.elements import group_element
-from lie_codegen.steering.constraints import Cone, check_obstacles, limits
+from lie_codegen.steering.blocks import Box, Cylinder
+from lie_codegen.steering.constraints import Ball, Cone, check_obstacles, limits
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.torque_reach import require_torques_reach
 from lie_codegen.steering.transcription.numbers import Dynamics, Numbers, Options
@@ -55,14 +56,15 @@ def nondimensional(task: Task, asked: Options) -> tuple[Structure, Numbers]:
     # more. The solver then sees numbers of order one whatever the task's clock.
     unit = D if second is None else D * D
     named = [(each, f"obstacle {number} ({type(each).__name__})") for number, each in enumerate(checked, start=1)]
-    # Cones first: the constraints of a stage are numbered so, and the sort keeps the user's order otherwise.
-    named.sort(key=lambda pair: not isinstance(pair[0], Cone))
+    # Cones, balls, solids: the constraints of a stage are numbered so, and the sort keeps the user's order otherwise.
+    named.sort(key=lambda pair: (Cone, Ball, Box, Cylinder).index(type(pair[0])))
     structure = Structure(
         group,
         task.controls,
         asked.intervals,
         cones=sum(isinstance(each, Cone) for each in checked),
-        balls=sum(not isinstance(each, Cone) for each in checked),
+        balls=sum(isinstance(each, Ball) for each in checked),
+        solids=sum(isinstance(each, Box | Cylinder) for each in checked),
         via=tuple(nodes),
         free_time=asked.objective == "time",
         second_order=second is not None,

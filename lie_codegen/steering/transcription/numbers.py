@@ -20,7 +20,7 @@ class Options:
     Attributes:
         bounds: of the controls: a number (both signs), a (low, high) pair, or {label: either}; units of u.
         rate_bounds: of the controls' time derivatives, as bounds.
-        obstacles: `Cone`s (attitude exclusion) and `Ball`s (position), for all of the way.
+        obstacles: `Cone`s (attitude exclusion), `Ball`s, `Box`es and `Cylinder`s (position), for all of the way.
         via: (fraction of the duration, element or coordinates of the second kind) to pass through.
         drift: (n,) constant velocity added to the controls' own: X' = X hat(drift + u).
         rest: controls are zero at both ends.

@@ -14,6 +14,8 @@ from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import pushed
 
 _WITHIN = 0.5
+#: Under the roots of distances, so that they have a slope where they vanish.
+_SMOOTH = 1e-12
 
 
 def path(structure: Structure, kind: str) -> StageFunctions:
@@ -64,7 +66,7 @@ def _without_free_motion(structure: Structure, at: Symbols) -> Any:
 
 def _clearances(structure: Structure, at: Symbols) -> list[Any]:
     d = structure.group.degree
-    if not structure.cones + structure.balls:
+    if not structure.cones + structure.balls + structure.solids:
         return []
     matrix = unpack(structure.group, ca.vertsplit(at.parts["X"]))
     cones, balls = ca.reshape(at.parts["cones"], 7, -1), ca.reshape(at.parts["balls"], d, -1)
@@ -75,4 +77,24 @@ def _clearances(structure: Structure, at: Symbols) -> list[Any]:
     for number in range(structure.balls):
         square = sum((matrix[i][d - 1] - balls[i, number]) ** 2 for i in range(d - 1))
         rows.append(square - balls[d - 1, number] ** 2)
+    solids = ca.reshape(at.parts["solids"], structure.solid, -1)
+    rows += [
+        _solid_gap(ca.vertcat(*[matrix[i][d - 1] for i in range(d - 1)]), solids[:, number])
+        for number in range(structure.solids)
+    ]
     return rows
+
+
+def _solid_gap(p: Any, given: Any) -> Any:
+    """Distance of p to the surface of a solid, as `obstacles.solids` has it; roots have a slope at zero, too."""
+    q = p.numel()
+    center, axes, halves = given[:q], ca.reshape(given[q : q + q * q], q, q), given[q + q * q : 2 * q + q * q]
+    tube, rounding = given[-2], given[-1]
+    own = axes.T @ (p - center)
+    off = ca.sqrt(ca.sumsqr(own[:2]) + _SMOOTH)
+    first = tube * off + (1 - tube) * ca.fabs(own[0])
+    # the second coordinate of a cylinder is in the first
+    second = ca.fabs(own[1]) if q == 2 else ca.fabs(own[1]) * (1 - tube) - tube / _SMOOTH
+    e = ca.vertcat(first, second, *[ca.fabs(own[i]) for i in range(2, q)]) - halves
+    beyond = ca.fmax(e, 0)
+    return ca.sqrt(ca.sumsqr(beyond) + _SMOOTH) + ca.fmin(ca.mmax(e), 0) - rounding

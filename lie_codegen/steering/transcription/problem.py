@@ -79,7 +79,7 @@ def program(structure: Structure, solver: str, *, listening: bool = False) -> Pr
         gap_rows.append(len(equality))
         equality += [True] * (structure.stage if k < structure.intervals else 0)
         rows = {"via": structure.group.dim, "last": structure.group.dim}.get(kind, 0)
-        clear = structure.cones + structure.balls if structure.watched(kind) else 0
+        clear = structure.cones + structure.balls + structure.solids if structure.watched(kind) else 0
         limits = 2 * len(structure.controls) if structure.free_time and kind != "last" else 0
         half_space = 1 if structure.guarded and rows else 0
         equality += [True] * rows + [False] * (half_space + clear + limits)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.steering.constraints import Cone
+from lie_codegen.steering.constraints import Ball, Cone
 from lie_codegen.steering.obstacles.tunnels import tunnels
 from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.task import Task
@@ -227,8 +227,12 @@ def _parameters(bench: Workbench, margins: Array, aim: Array) -> Array:
     numbers, group = bench.numbers, bench.task.group
     parts: list[Any] = [pack_element(group, aim), numbers.drift, numbers.weights]
     for obstacle, margin in zip(numbers.obstacles, margins, strict=True):
-        values = list(obstacle.parameters())
-        values[-1] = values[-1] - margin if isinstance(obstacle, Cone) else np.sqrt(values[-1] ** 2 + margin)
+        if isinstance(obstacle, Cone | Ball):
+            values = list(obstacle.parameters())
+            values[-1] = values[-1] - margin if isinstance(obstacle, Cone) else np.sqrt(values[-1] ** 2 + margin)
+        else:
+            one = obstacle.solid()
+            values = [*one.centers[0], *one.axes[0].T.ravel(), *one.halves[0], *one.tubes, one.rounding[0] + margin]
         parts.append(values)
     parts += [pack_element(group, element) for element in numbers.via]
     parts.append(np.minimum(np.minimum(-numbers.rates[0], numbers.rates[1]), 1e6))

@@ -19,7 +19,7 @@ class Structure:
     Attributes:
         group, controls: the system.
         intervals: N.
-        cones, balls: how many of each.
+        cones, balls, solids: how many of each; solids are boxes and cylinders.
         via: nodes at which X is given.
         free_time: whether the duration is a variable, and the objective.
         second_order: whether the controls are torques, the state (X, xi).
@@ -34,6 +34,7 @@ class Structure:
     intervals: int
     cones: int = 0
     balls: int = 0
+    solids: int = 0
     via: tuple[int, ...] = ()
     free_time: bool = False
     second_order: bool = False
@@ -74,11 +75,18 @@ class Structure:
             ("weights", len(self.controls)),
             ("cones", 7 * self.cones),
             ("balls", self.group.degree * self.balls),
+            ("solids", self.solid * self.solids),
             ("via", self.size * len(self.via)),
             ("rates", len(self.controls)),
             ("masses", 2 * n * n if self.second_order else 0),
             ("free", n * self.free),
         )
+
+    @property
+    def solid(self) -> int:
+        """Numbers of a solid: its center, axes, half sizes, whether it is a cylinder, its rounding."""
+        q = self.group.degree - 1
+        return q * q + 2 * q + 2
 
     @property
     def stage(self) -> int:
