@@ -1,29 +1,36 @@
 """lie-codegen bench propagate: driven qubits, chains, long runs and loops against general solvers, error beside every time.
 
 Every tool works in a process of its own and is told in turn to run; the time is the processor's, of all its threads. What it computed
-is compared with a stored row first; a ratio is given only where the other's error is at least a third of ours, since time
-bought with error is no gain.
+is compared with a stored value first; a ratio is given only where the faster errs at most three times as much as the slower, since
+time bought with error is no gain.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import IO, Any
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from lie_codegen.arrays import Array
-from lie_codegen.benchmarks.propagate_cases import Case, chain_case
+from lie_codegen.benchmarks import loop_peers, propagate_peers
+from lie_codegen.benchmarks.loop_cases import loop_case
+from lie_codegen.benchmarks.propagate_cases import chain_case
 from lie_codegen.benchmarks.propagate_ours import own_rows
-from lie_codegen.benchmarks.propagate_peers import TOOLS
 from lie_codegen.benchmarks.propagate_targets import COUNTS, target_rows
+from lie_codegen.benchmarks.turns import ROUNDS, Case, Tool
+from lie_codegen.errors import InputError
 
-#: (qubits, members, tolerances).
-CASES = ((1, 1, (1e-6, 1e-9, 1e-12)), (1, 1000, (1e-10,)), (2, 1, (1e-6, 1e-9, 1e-12)), (3, 1, (1e-6, 1e-9, 1e-12)))
+_TOLERANCES = (1e-6, 1e-9, 1e-12)
+Contest = tuple[Case, Sequence[str], Sequence[float]]
+#: What is computed, by which tools (ours first), and how exactly.
+CONTESTS: tuple[Contest, ...] = (
+    *((chain_case(qubits), tuple(propagate_peers.TOOLS), _TOLERANCES) for qubits in (1, 2, 3)),
+    (chain_case(1, 1000), tuple(propagate_peers.TOOLS), (1e-10,)),
+    (loop_case(), tuple(loop_peers.TOOLS), _TOLERANCES),
+    (loop_case(10_000), tuple(loop_peers.TOOLS), (1e-8,)),
+)
 #: (system, tolerance, tool, at least so many times our time).
 RATIOS = (
     ("qubit", 1e-12, "scipy DOP853", 200.0),
@@ -39,7 +46,7 @@ LIMITS = (
     ("two qubits", 1e-12, 0.6),
     ("three qubits", 1e-12, 3.0),
     ("so3, T = 5e4", 1e-11, 300.0),
-    ("PD loop", 1e-10, 3.0),
+    ("PD loop", 1e-9, 3.0),
     ("PD loop, another inertia", 1e-10, 5.0),
     ("10,000 PD loops, 500 steps", 1e-6, 1000.0),
     ("a process to a law", 0.0, 300.0),
@@ -48,8 +55,8 @@ LIMITS = (
 )
 #: An error far above what was asked for is no result; ours is held to this many times the tolerance.
 _SLACK, _PEER_SLACK = 10.0, 1e4
-#: Rounds, the least that is timed at once, and when a tool is not asked again: seconds.
-_ROUNDS, _LEAST, _PATIENCE = 7, 2e-3, 2.0
+#: Errors below it are as good as none.
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -80,79 +87,55 @@ class PropagateRow:
 def bench_propagate(
     say: Callable[[str], None] = lambda text: None,
     *,
-    cases: Sequence[tuple[int, int, tuple[float, ...]]] = CASES,
-    tools: Sequence[str] = tuple(TOOLS),
+    contests: Sequence[Contest] = CONTESTS,
+    only: str = "",
     own: bool = True,
 ) -> tuple[list[PropagateRow], list[str]]:
     """The rows, and the stated ratios and limits that were missed.
 
     Args:
         say: is told what is going on.
-        cases: (qubits, members, tolerances).
-        tools: names of `TOOLS`, ours first.
-        own: whether to run the systems that have no linear form: long runs and loops.
+        contests: systems with their tools and tolerances.
+        only: keeps the systems with this text in their names, and leaves out the rest of ours.
+        own: whether to run what has no peer: long runs, fixed steps, fresh processes and results.
+
+    Raises:
+        InputError: no system has the text in its name.
     """
+    chosen = [contest for contest in contests if only.lower() in contest[0].name.lower()]
+    if not chosen:
+        names = ", ".join(case.name for case, _, _ in contests)
+        raise InputError(f"bench propagate: no system has {only!r} in its name; they are {names}")
     rows: list[PropagateRow] = []
-    for qubits, members, tolerances in cases:
-        case = chain_case(qubits, members)
+    for case, tools, tolerances in chosen:
         for rtol in tolerances:
             say(f"{case.name}, {rtol:g}")
-            rows += _with_ratios(_compete(case, rtol, tools))
-    if own:
+            rows += with_ratios(_compete(case, rtol, tools))
+    if own and not only:
         rows += [PropagateRow(*row) for row in own_rows(say)]
         rows += [PropagateRow(*row) for row in target_rows(say)]
     return rows, missed(rows)
 
 
-class _Tool:
-    """A process that runs a case when it is told to."""
-
-    def __init__(self, name: str, case: Case, rtol: float) -> None:
-        command = [sys.executable, "-m", "lie_codegen.benchmarks.propagate_peers", name, f"{case.qubits}"]
-        self.name = name
-        self._process = subprocess.Popen(
-            [*command, f"{len(case.scales)}", repr(rtol)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )  # fmt: skip
-        self.seconds, self.spent = float("inf"), 0.0
-        line = _pipe(self._process.stdout).readline()
-        answer: dict[str, Any] = json.loads(line) if line else {"absent": "the process ended"}
-        self.absent: str = answer.get("absent", "")
-        self.rows = np.empty(0) if self.absent else np.array(answer["re"]) + 1j * np.array(answer["im"])
-        self.first = float(answer.get("first", "nan"))
-
-    def run(self) -> None:
-        """One round: often enough to be measured."""
-        count = 1 if not np.isfinite(self.seconds) else int(np.clip(_LEAST / self.seconds, 1, 200))
-        _pipe(self._process.stdin).write(f"{count}\n")
-        _pipe(self._process.stdin).flush()
-        line = _pipe(self._process.stdout).readline()
-        if line:
-            seconds = float(json.loads(line)["seconds"])
-            self.seconds, self.spent = min(self.seconds, seconds), self.spent + count * seconds
-
-    def end(self) -> None:
-        """No more rounds."""
-        _pipe(self._process.stdin).close()
-        self._process.wait()
-
-
-def _pipe(pipe: IO[str] | None) -> IO[str]:
-    if pipe is None:
-        raise RuntimeError("a process without pipes")
-    return pipe
+def versions() -> dict[str, str]:
+    """Of the tools that are installed."""
+    found = {}
+    for name in ("heyoka", "qutip", "dynamiqs", "diffrax", "jax", "scipy", "numba"):
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def _compete(case: Case, rtol: float, names: Sequence[str]) -> list[PropagateRow]:
-    tools = [_Tool(name, case, rtol) for name in names]
+    tools = [Tool(name, case, rtol) for name in names]
     try:
         taking = [tool for tool in tools if not tool.absent]
-        wanted = taking[0].rows if taking else np.empty(0)
-        errors = {tool.name: _error(case, tool.rows, wanted) for tool in taking}
+        wanted = taking[0].found if taking else np.empty(0)
+        errors = {tool.name: case.error(tool.found, wanted) for tool in taking}
         taking = [tool for tool in taking if errors[tool.name] <= max(_PEER_SLACK * rtol, 1e-9)]
-        for _ in range(_ROUNDS):
+        for _ in range(ROUNDS):
             for tool in taking:
-                if tool.spent < _PATIENCE:
-                    tool.run()
+                tool.run()
     finally:
         for tool in tools:
             tool.end()
@@ -166,19 +149,18 @@ def _compete(case: Case, rtol: float, names: Sequence[str]) -> list[PropagateRow
     ]  # fmt: skip
 
 
-def _error(case: Case, rows: Array, ours: Array) -> float:
-    """Of the member whose row is stored; and how far the others are from ours."""
-    stored = float(np.max(np.abs(rows[case.stored][0] - case.row)))
-    return max(stored, float(np.max(np.abs(rows - ours)))) if rows.shape == ours.shape else float("inf")
-
-
-def _with_ratios(rows: Sequence[PropagateRow]) -> list[PropagateRow]:
-    """Times over ours where the other's error is not less than a third of ours."""
+def with_ratios(rows: Sequence[PropagateRow]) -> list[PropagateRow]:
+    """Times over ours, the first, where the faster of the two errs at most three times as much as the slower."""
     mine = rows[0]
+
+    def fair(row: PropagateRow) -> bool:
+        fast, slow = (row, mine) if row.seconds < mine.seconds else (mine, row)
+        return fast.error <= 3 * max(slow.error, _ROUNDING)
+
     return [
-        replace(row, ratio=row.seconds / mine.seconds) if row is not mine and mine.error <= 3 * max(row.error, 1e-13) else row
+        replace(row, ratio=row.seconds / mine.seconds) if row is not mine and not row.note and fair(row) else row
         for row in rows
-    ]  # fmt: skip
+    ]
 
 
 def missed(rows: Sequence[PropagateRow]) -> list[str]:

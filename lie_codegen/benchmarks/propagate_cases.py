@@ -65,6 +65,17 @@ class Case:
     row: NDArray[np.complex128]
 
     @property
+    def command(self) -> tuple[str, ...]:
+        """Module and arguments of the process that runs it."""
+        return "lie_codegen.benchmarks.propagate_peers", str(self.qubits), str(len(self.scales))
+
+    def error(self, found: Array, ours: Array) -> float:
+        """Of the member whose row is stored; and how far the others are from ours."""
+        if found.shape != ours.shape:
+            return float("inf")
+        return max(float(np.max(np.abs(found[self.stored][0] - self.row))), float(np.max(np.abs(found - ours))))
+
+    @property
     def rows(self) -> int:
         """How many rows of X a tool has to integrate: one of a qubit, for the other follows, else all."""
         return 1 if self.qubits == 1 else len(self.constant)

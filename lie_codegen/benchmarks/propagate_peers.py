@@ -1,15 +1,11 @@
-"""The tools of `lie-codegen bench propagate`, each in a process of its own: a line "run" on stdin, a line of JSON on stdout.
+"""The tools of the driven qubits in `lie-codegen bench propagate`, each in a process of its own (`turns.py`).
 
-    python -m lie_codegen.benchmarks.propagate_peers TOOL QUBITS MEMBERS RTOL
-
-The first line says what was computed and how long building took, or why the tool cannot take part.
+python -m lie_codegen.benchmarks.propagate_peers TOOL QUBITS MEMBERS RTOL
 """
 
 from __future__ import annotations
 
-import json
 import sys
-import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -18,6 +14,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.propagate_cases import Case, chain_case
 from lie_codegen.benchmarks.rows import AbsentError
+from lie_codegen.benchmarks.turns import answer, imported
 
 #: Gives the rows of X(T) of all members: (N, rows, d).
 Call = Callable[[], Array]
@@ -63,7 +60,7 @@ def real_form(case: Case) -> tuple[Array, Array, Array]:
 
 def heyoka(case: Case, rtol: float) -> Call:
     """Taylor series compiled for the system; members eight at a time."""
-    hk = _imported("heyoka")
+    hk = imported("heyoka")
     C, D, start = real_form(case)
     size, rows = start.shape
     y = np.array(hk.make_vars(*[f"y{i}" for i in range(size * rows)])).reshape(size, rows)
@@ -107,7 +104,7 @@ def heyoka(case: Case, rtol: float) -> Call:
 
 def qutip(case: Case, rtol: float) -> Call:
     """sesolve by Verner's method of order 9."""
-    qt = _imported("qutip")
+    qt = imported("qutip")
     if len(case.scales) > 1:
         raise AbsentError("one trajectory at a time")
     # x^T' = A^T x^T = -i (i A^T) x^T
@@ -130,9 +127,9 @@ def qutip(case: Case, rtol: float) -> Call:
 
 def diffrax(case: Case, rtol: float) -> Call:
     """Dopri8 with a PID controller, jitted; members by vmap."""
-    jax = _imported("jax")
+    jax = imported("jax")
     jax.config.update("jax_enable_x64", True)
-    dfx, jnp = _imported("diffrax"), _imported("jax.numpy")
+    dfx, jnp = imported("diffrax"), imported("jax.numpy")
     C, D, start = (jnp.asarray(each) for each in real_form(case))
     rates, d = jnp.asarray(case.rates), len(case.constant)
 
@@ -156,6 +153,29 @@ def diffrax(case: Case, rtol: float) -> Call:
     return call
 
 
+def dynamiqs(case: Case, rtol: float) -> Call:
+    """sesolve by Dopri8 in double precision, which it jits; members as a batch, all columns of a chain as another."""
+    dq, jnp = imported("dynamiqs"), imported("jax.numpy")
+    dq.set_precision("double")
+    dq.set_progress_meter(False)
+    d, scales = len(case.constant), jnp.asarray(case.scales)
+
+    def wave(w: float) -> Callable[[Any], Any]:
+        return lambda t: scales * jnp.cos(w * t) if len(scales) > 1 else jnp.cos(w * t)
+
+    H = dq.constant(1j * case.constant.T)
+    for w, A in zip(case.rates, case.driven, strict=True):
+        H = H + dq.modulated(wave(w), 1j * A.T)
+    columns = np.eye(d, dtype=complex)[: case.rows, :, None]
+    start, method = columns[0] if case.rows == 1 else columns, dq.method.Dopri8(rtol=rtol, atol=rtol)
+
+    def call() -> Array:
+        end = dq.sesolve(H, start, [0.0, case.duration], method=method, save_states=False).final_state
+        return np.asarray(end.to_numpy()).reshape(len(scales), case.rows, d)
+
+    return call
+
+
 def scipy(case: Case, rtol: float) -> Call:
     """solve_ivp, DOP853."""
     return _solve_ivp(case, rtol, _python_rate(case))
@@ -163,7 +183,7 @@ def scipy(case: Case, rtol: float) -> Call:
 
 def numba(case: Case, rtol: float) -> Call:
     """The same with the right side compiled by numba."""
-    nb = _imported("numba")
+    nb = imported("numba")
     A0, D, rates = (
         np.ascontiguousarray(case.constant.T),
         np.ascontiguousarray(np.swapaxes(case.driven, 1, 2)),
@@ -218,50 +238,11 @@ def _solve_ivp(case: Case, rtol: float, rate: Callable[[float, Any], Any]) -> Ca
     return call
 
 
-def _imported(name: str) -> Any:
-    from importlib import import_module
-
-    try:
-        return import_module(name)
-    except Exception as error:  # a broken installation is as good as none
-        raise AbsentError(f"{name} cannot be imported: {type(error).__name__}: {str(error)[:80]}") from None
-
-
 TOOLS: Mapping[str, Callable[[Case, float], Call]] = {
-    "lie_codegen": ours, "heyoka": heyoka, "qutip vern9": qutip, "diffrax Dopri8": diffrax, "scipy DOP853": scipy,
+    "lie_codegen": ours, "heyoka": heyoka, "qutip vern9": qutip, "dynamiqs Dopri8": dynamiqs, "diffrax Dopri8": diffrax, "scipy DOP853": scipy,
     "scipy + numba": numba,
 }  # fmt: skip
 
 
-def main(tool: str, qubits: int, members: int, rtol: float) -> None:
-    """Prepare, say what was computed, then run whenever told to."""
-    out = sys.stdout
-    sys.stdout = sys.stderr  # what a tool prints is no answer of ours
-
-    def say(**what: Any) -> None:
-        out.write(json.dumps(what) + "\n")
-        out.flush()
-
-    case = chain_case(qubits, members)
-    start = time.process_time()
-    try:
-        call = TOOLS[tool](case, rtol)
-        rows = np.asarray(call(), dtype=complex)
-    except AbsentError as reason:
-        say(absent=str(reason))
-        return
-    except Exception as error:  # whatever a foreign library raises, the others go on
-        say(absent=f"{type(error).__name__}: {str(error).splitlines()[0][:120] if str(error) else ''}")
-        return
-    first = time.process_time() - start
-    say(first=first, re=rows.real.tolist(), im=rows.imag.tolist())
-    for line in sys.stdin:
-        count = int(line)
-        start = time.process_time()
-        for _ in range(count):
-            call()
-        say(seconds=(time.process_time() - start) / count)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))
+    answer(lambda: (TOOLS[sys.argv[1]](chain_case(*map(int, sys.argv[2:4])), float(sys.argv[4])), np.asarray))

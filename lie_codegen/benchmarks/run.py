@@ -6,13 +6,12 @@ section with it and no other.
 
 from __future__ import annotations
 
-import os
 import pickle
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -25,7 +24,6 @@ from lie_codegen.benchmarks.limits import Limits, keep_to_one_core, limits, mach
 from lie_codegen.benchmarks.loops import monte_carlo_row, trajectory_row
 from lie_codegen.benchmarks.rows import Row
 from lie_codegen.benchmarks.study_row import study_row
-from lie_codegen.benchmarks.timing import Spread, Timing
 from lie_codegen.errors import ComputationError, InputError
 from lie_codegen.groups.catalogue_load import group as load
 from lie_codegen.groups.kernels import group_kernel
@@ -64,22 +62,17 @@ class Bench:
     failed: dict[str, str]
 
 
-def bench(rounds: int = 15, report: Report = lambda line: None, only: str = "", against: Path | None = None) -> Bench:
+def bench(rounds: int = 15, report: Report = lambda line: None, only: str = "") -> Bench:
     """Run the sections, each in a fresh process.
 
     Args:
         rounds: of each comparison.
         report: is told what is going on.
         only: runs the sections with this text in their titles.
-        against: a checkout of another commit: its sections run in turn with ours, and its times stand in our rows.
 
     Raises:
-        InputError: no section has it; the folder holds no checkout.
+        InputError: no section has it.
     """
-    if against is not None and not (against / "lie_codegen" / "benchmarks" / "run.py").is_file():
-        raise InputError(
-            f"bench: {against} is no checkout of lie_codegen; make one with git worktree add FOLDER COMMIT"
-        )
     chosen = [title for title in SECTIONS if only.lower() in title.lower()]
     if not chosen:
         raise InputError(f"bench: no section has {only!r} in its title; they are {', '.join(SECTIONS)}")
@@ -90,44 +83,28 @@ def bench(rounds: int = 15, report: Report = lambda line: None, only: str = "", 
     for title in chosen:
         report(title)
         try:
-            mine = _in_a_process(title, rounds, None)
-            if against is not None:
-                others, again = _in_a_process(title, rounds, against), _in_a_process(title, rounds, None)
-                mine = [_beside(*three, str(against)) for three in zip(mine, others, again, strict=False)]
+            rows += _in_a_process(title, rounds)
         except ComputationError as error:
             failed[title] = str(error)
-        else:
-            rows += mine
     return Bench(machine(), bounds, tuple(rows), failed)
 
 
 _MARK = b"lie_codegen rows\n"
 
 
-def _in_a_process(title: str, rounds: int, checkout: Path | None) -> list[Row]:
-    """The rows of one section, by this package or by that of a checkout.
+def _in_a_process(title: str, rounds: int) -> list[Row]:
+    """The rows of one section.
 
     Raises:
         ComputationError: with the last line of what went wrong.
     """
     command = [sys.executable, "-m", "lie_codegen.benchmarks.run", title, str(rounds)]
-    place = {} if checkout is None else {"PYTHONPATH": str(checkout.resolve())}
-    done = subprocess.run(command, capture_output=True, check=False, cwd=checkout, env={**os.environ, **place})
+    done = subprocess.run(command, capture_output=True, check=False)
     if done.returncode:
         text = done.stderr.decode(errors="replace").strip().splitlines()
         raise ComputationError(text[-1][:300] if text else f"ended with status {done.returncode}")
     rows: list[Row] = pickle.loads(done.stdout[done.stdout.index(_MARK) + len(_MARK) :])
     return rows
-
-
-def _beside(mine: Row, other: Row, again: Row, name: str) -> Row:
-    """Our row with our time by another checkout, which ran between two runs of ours: the faster of the two counts."""
-    ours = min(
-        (next(iter(row.timings.values())).nanoseconds for row in (mine, again)), key=lambda spread: spread.middle
-    )
-    theirs = next(iter(other.timings.values())).nanoseconds
-    ratio = Spread(theirs.low / ours.low, theirs.middle / ours.middle, theirs.high / ours.high)
-    return replace(mine, timings={**mine.timings, f"lie_codegen, {name}": Timing(theirs, ratio)})
 
 
 def section(title: str, rounds: int) -> list[Row]:

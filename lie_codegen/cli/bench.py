@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -21,17 +20,25 @@ def bench(
     what: Annotated[
         str,
         typer.Argument(
-            help='"" for everything that is timed, "steering", "control", "engines", "propagate", "published".'
+            help='Nothing for calls, batches, loops and cold starts; or "neighbours", "propagate", "steering", "control", "engines", "published".'
         ),
     ] = "",
     rounds: Annotated[int, typer.Option(min=3, help="Rounds of each comparison.")] = 15,
-    only: Annotated[str, typer.Option(help="Only sections with this text in their titles.")] = "",
+    only: Annotated[str, typer.Option(help="Only sections, systems or kinds with this text in their names.")] = "",
     against: Annotated[
-        Path | None, typer.Option(help="A checkout of another commit, timed in turn with this one.")
-    ] = None,
+        str,
+        typer.Option(
+            help="Another commit, or a folder with a checkout: timed in turn with this one; status 1 if a row is slower or a plan dearer."
+        ),
+    ] = "",
     json: Json = False,
 ) -> None:
     """Time calls, batches, loops and cold starts against numba, jax, SymForce, CasADi, ...; ratios to ours."""
+    if against:
+        if what:
+            raise InputError("bench: --against compares two commits over rows of its own; give it no other benchmark")
+        _commits(against, rounds, only, json)
+        return
     if what == "steering":
         _steering(only, json)
         return
@@ -42,20 +49,34 @@ def bench(
         _engines(only, json)
         return
     if what == "propagate":
-        _propagate(json)
+        _propagate(only, json)
+        return
+    if what == "neighbours":
+        _neighbours(rounds, json)
         return
     if what == "published":
         _published(only, json)
         return
     if what:
         raise InputError(
-            f'bench: nothing is called {what!r}; there are "steering", "control", "engines", "propagate", "published", or nothing for the rest'
+            f'bench: nothing is called {what!r}; there are "neighbours", "propagate", "steering", "control", "engines", "published", or nothing for the rest'
         )
     from lie_codegen.benchmarks.run import bench as measure
 
     with progress("bench") as report:
-        result = measure(rounds, report, only, against)
+        result = measure(rounds, report, only)
     emit(_text(result), asdict(result), json)
+    if result.failed:
+        raise typer.Exit(1)
+
+
+def _commits(against: str, rounds: int, only: str, json: bool) -> None:
+    from lie_codegen.benchmarks.commits import bench_commits, table, worse
+
+    with progress("bench --against") as report:
+        rows = bench_commits(against, rounds, only, report)
+    misses = worse(rows)
+    _told(table(rows, misses), rows, misses, json)
 
 
 def _steering(only: str, json: bool) -> None:
@@ -85,12 +106,23 @@ def _engines(only: str, json: bool) -> None:
     _told(table(rows, misses), rows, misses, json)
 
 
-def _propagate(json: bool) -> None:
-    from lie_codegen.benchmarks.propagate import bench_propagate, table
+def _propagate(only: str, json: bool) -> None:
+    from lie_codegen.benchmarks.limits import machine
+    from lie_codegen.benchmarks.propagate import bench_propagate, table, versions
 
     with progress("bench propagate") as report:
-        rows, missed = bench_propagate(report)
-    _told(table(rows, missed), rows, missed, json)
+        rows, missed = bench_propagate(report, only=only)
+    where, tools = machine(), versions()
+    heading = f"{where}, {', '.join(f'{name} {version}' for name, version in tools.items())}\n"
+    _told(heading + table(rows, missed), rows, missed, json, machine=where, versions=tools)
+
+
+def _neighbours(rounds: int, json: bool) -> None:
+    from lie_codegen.benchmarks.neighbours import bench_neighbours, table
+
+    with progress("bench neighbours") as report:
+        rows = bench_neighbours(rounds, report)
+    _told(table(rows), rows, [], json)
 
 
 def _published(only: str, json: bool) -> None:
@@ -101,9 +133,9 @@ def _published(only: str, json: bool) -> None:
     _told(table(rows, missed), rows, missed, json)
 
 
-def _told(text: str, rows: Sequence[Any], missed: Sequence[str], json: bool) -> None:
+def _told(text: str, rows: Sequence[Any], missed: Sequence[str], json: bool, **about: Any) -> None:
     """The rows as a text or JSON; exit status 1 where a stated figure is missed."""
-    emit(text, {"rows": [asdict(row) for row in rows], "missed": missed}, json)
+    emit(text, {**about, "rows": [asdict(row) for row in rows], "missed": missed}, json)
     if missed:
         raise typer.Exit(1)
 

@@ -59,6 +59,7 @@ TARGETS = (
         "hessian_errors",
         "accuracy near the identity: exp and log with two derivatives, ours and the neighbours'",
     ),
+    Target("propagation_speed", "propagation_speed", "time and error of propagation, ours beside general solvers"),
     Target(
         "tracking_certificates",
         "tracking_certificates",

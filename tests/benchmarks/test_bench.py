@@ -12,12 +12,14 @@ from scipy.linalg import expm, logm
 
 import lie_codegen as lc
 from lie_codegen.benchmarks import cold as bench_cold
+from lie_codegen.benchmarks import commits
 from lie_codegen.benchmarks import group_loops as bench_group_loops
 from lie_codegen.benchmarks import kernels as bench_kernels
 from lie_codegen.benchmarks import laws as bench_laws
 from lie_codegen.benchmarks import loops as bench_loops
 from lie_codegen.benchmarks import peers as bench_peers
 from lie_codegen.benchmarks import run as bench
+from lie_codegen.benchmarks.commits import CommitRow
 from lie_codegen.benchmarks.rows import AbsentError, Entrant, Row, compare, compete, flat
 from lie_codegen.benchmarks.timing import timings_of
 from lie_codegen.codegen.templates import template_folder
@@ -133,16 +135,47 @@ def test_the_cold_programs_are_python() -> None:
     ast.parse((template_folder() / "bench_cold_numba.py").read_text(encoding="utf-8"))
 
 
-def test_another_checkout_stands_beside_the_faster_of_our_two_runs(tmp_path: Path) -> None:
-    def row(nanoseconds: float) -> Row:
-        return Row("call", "f", "ns", timings_of({"lie_codegen": [nanoseconds] * 3, "numba": [10.0] * 3}))
+def test_a_commit_is_slower_where_every_pair_of_processes_says_so() -> None:
+    rows = [
+        CommitRow("noise", 1.2, 1.0, (1.2, 0.99, 1.3)),
+        CommitRow("slow", 1.2, 1.0, (1.2, 1.06, 1.3)),
+        CommitRow("plan", 1.0, 1.0, (1.0,), 2.0, 2.001),
+        CommitRow("dear plan", 1.0, 1.0, (1.0,), 2.1, 2.0),
+        CommitRow("new", note="the other: AttributeError"),
+    ]
+    found = commits.worse(rows)
+    assert [text.split(":")[0] for text in found] == ["slow", "dear plan"]
+    text = commits.table(rows, found)
+    assert "worse: slow: 1.060 to 1.300" in text
+    assert "new                                          -  the other: AttributeError" in text
+    joined = commits._joined([CommitRow("x", 3.0, 4.0, (0.75,), 1.0, 1.0), CommitRow("x", 2.0, 5.0, (0.4,), 1.0, 1.0)])
+    assert (joined.ours, joined.theirs, joined.ratios) == (2.0, 4.0, (0.75, 0.4))
 
-    found = bench._beside(row(4.0), row(3.0), row(2.0), "old")
-    assert found.timings["lie_codegen, old"].nanoseconds.middle == 3.0
-    assert found.timings["lie_codegen, old"].ratio.middle == 1.5
-    assert found.timings.keys() == {"lie_codegen", "numba", "lie_codegen, old"}
-    with pytest.raises(InputError, match="no checkout"):
-        bench.bench(only="Monte Carlo", against=tmp_path)
+
+@needs_compiler
+def test_two_checkouts_run_in_turn_and_what_one_lacks_is_named(repository: Path, tmp_path: Path) -> None:
+    other = tmp_path / "lie_codegen"
+    other.mkdir()
+    for name, text in {"__init__.py": "from lie_codegen.all import *", "all.py": _OTHER}.items():
+        (other / name).write_text(text)
+    [row] = commits.bench_commits(str(tmp_path), 1, "so3 exp, call", pairs=1)
+    assert row.ratios[0] < 1
+    [row] = commits.bench_commits(str(tmp_path), 1, "propagator", pairs=1)
+    assert row.note.startswith("the other: AttributeError")
+    with pytest.raises(InputError, match="neither a checkout of lie_codegen nor a commit"):
+        commits.bench_commits("no-such-commit", 1)
+    with pytest.raises(InputError, match="no row has 'so99'"):
+        commits.bench_commits(str(tmp_path), 1, "so99")
+
+
+#: A package that can do one kernel, slowly.
+_OTHER = """
+from types import SimpleNamespace
+def group_kernels(group):
+    return [SimpleNamespace(name="exp", inputs=[SimpleNamespace(shape=(3,))], sampler=lambda rng: ([0.0] * 3,))]
+def build(kernels):
+    return {"exp": lambda x: sum(range(100_000))}
+"""
 
 
 @needs_compiler

@@ -106,7 +106,7 @@ def test_every_thread_computes_its_sample(tmp_path: Path, target: str, real: str
 
 
 @pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("group", ["se3", "su3"])
+@pytest.mark.parametrize("group", ["se3", pytest.param("su3", marks=pytest.mark.slow)])
 def test_pocl_runs_the_opencl_text(real: str, group: str) -> None:
     cl = pytest.importorskip("pyopencl")
     try:

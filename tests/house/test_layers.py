@@ -40,7 +40,7 @@ ALLOWED = {
     "qutip": {"benchmarks", "steering"},
     "qutip_qtrl": {"benchmarks"},
     "rsplan": {"benchmarks"},
-    "mpmath": {"gallery"},
+    "mpmath": {"gallery", "benchmarks"},
     "matplotlib": {"pictures", "gallery"},
     "anywidget": {"pictures"},
     "traitlets": {"pictures"},
