@@ -160,14 +160,14 @@ def bench_neighbours(
         else:
             taking[name] = made
     say("times")
-    calls = {
-        "exp": interleaved({name: _work(each.exp, x) for name, each in taking.items()}, 1, rounds),
-        "log": interleaved({name: _work(each.log, X) for name, each in taking.items() if each.log}, 1, rounds),
-        "many": interleaved({n: _work(each.many, batch) for n, each in taking.items() if each.many}, _BATCH, rounds),
-    }
+    calls = (
+        interleaved({name: _work(each.exp, x) for name, each in taking.items()}, 1, rounds),
+        interleaved({name: _work(each.log, X) for name, each in taking.items() if each.log}, 1, rounds),
+        interleaved({n: _work(each.many, batch) for n, each in taking.items() if each.many}, _BATCH, rounds),
+    )
     for name, each in taking.items():
-        least = [calls[kind][name].nanoseconds.low if name in calls[kind] else float("nan") for kind in calls]
-        rows[name] = NeighbourRow(name, *least, *errors(each))
+        exp, log, many = (found[name].nanoseconds.low if name in found else float("nan") for found in calls)
+        rows[name] = NeighbourRow(name, exp, log, many, *errors(each))
     return [rows[name] for name in libraries]
 
 
