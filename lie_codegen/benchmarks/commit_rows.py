@@ -48,8 +48,8 @@ def makers() -> Iterator[tuple[str, Callable[[], Work]]]:
         ("so3", (0, 1), "area_rule"), ("so3", (0, 1), "transcription"), ("se2", (0, 1), "transcription"),
     ):  # fmt: skip
         yield f"steer {name}, {method}", partial(_steer, name, controls, method)
-    for name, controls in (("so3", (0, 1)), ("su2", (0, 1)), ("se3", (0, 1, 2))):
-        yield f"steer {name}, bounds and drift", partial(_bounded, name, controls)
+    for name, count in (("so3", 2), ("su2", 2), ("se3", 3)):
+        yield f"steer {name}, bounds and drift", partial(_bounded, name, count)
 
 
 def _group_kernel(group: str, name: str) -> Any:
@@ -121,7 +121,11 @@ def _propagator() -> Work:
 
 def _loop(members: int, how: dict[str, Any]) -> Work:
     law = lc.attitude_law("pd", tunable=True)
-    given = {"law": law, "inertia": np.tile(np.diag([1.0, 2, 3]), (members, 1, 1)), "gains": {"k_p": 4, "k_d": 6}}
+    given: dict[str, Any] = {
+        "law": law,
+        "inertia": np.tile(np.diag([1.0, 2, 3]), (members, 1, 1)),
+        "gains": {"k_p": 4, "k_d": 6},
+    }
     xi0, t = np.linspace([1.0, 0.5, -0.2], [0.5, 0.2, 0.1], members), np.linspace(0, 10, 11)
     return lambda: lc.closed_loop("so3", xi0=xi0, t=t, **given, **how)
 
@@ -132,11 +136,11 @@ def _steer(name: str, controls: tuple[int, ...], method: str) -> Work:
     return lambda: lc.steer(name, target, controls=labels, duration=4.0, method=method)
 
 
-def _bounded(name: str, controls: tuple[int, ...]) -> Work:
+def _bounded(name: str, count: int) -> Work:
     G = lc.group(name)
     target, drift = np.resize([0.4, -0.3, 0.5, 0.2], G.dim), np.zeros(G.dim)
     drift[-1] = 0.3
-    labels = [G.labels[k] for k in controls]
+    labels = G.labels[:count]
     return lambda: lc.steer(name, target, controls=labels, duration=4.0, bounds=1.5, drift=drift, method="direct")
 
 
