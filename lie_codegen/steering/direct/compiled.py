@@ -1,4 +1,4 @@
-"""The search in C: templates/direct_core.c with the sizes of a group, built once and cached; nothing is built per problem."""
+"""The search in C: templates/direct_core.c and its headers with the sizes of a group, built once and cached; nothing is built per problem."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from lie_codegen.steering.direct.numpy_search import NumpySearch
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
 
 _CORE = "direct_core.c"
+_HEADERS = ("direct_lanes.h", "direct_chain.h", "direct_steps.h")
 _SIZES = "direct_sizes.h"
 _ALIGNED = 64
 
@@ -39,7 +40,8 @@ def machine(group: MatrixGroup, controls: int) -> Machine:
     def files() -> dict[str, str]:
         from lie_codegen.codegen.templates import template_folder
 
-        return {_CORE: (template_folder() / _CORE).read_text(encoding="utf-8"), _SIZES: sizes}
+        texts = {name: (template_folder() / name).read_text(encoding="utf-8") for name in (_CORE, *_HEADERS)}
+        return {**texts, _SIZES: sizes}
 
     library = build_source(files, _CORE, namespace="direct_core", definition=sizes)
     return (

@@ -1,4 +1,4 @@
-"""The search in numpy, where there is no compiler: the same steps as templates/direct_core.c, many lanes at once.
+"""The search in numpy, where there is no compiler: as templates/direct_core.c without Newton's steps, many lanes at once.
 
 Stage 1 reaches: Levenberg and Marquardt's steps on the residual, projected on the bounds, in the n reduced rows of the goal, so
 that systems are n by n whatever the number of controls. Stage 2 descends: the proximal step of the linearised problem, by
@@ -19,6 +19,8 @@ from lie_codegen.steering.direct.programme import Goal, Programme, Reached, Sett
 
 _LEAST, _MOST = 1e-13, 1e8
 _ROUNDING = 1e-13
+#: Times that a step is taken again without the controls it would push out of the box.
+_FACES = 4
 
 
 @dataclass
@@ -153,12 +155,18 @@ def _arrive(
 def _damped_step(box: Box, at: Lanes, damped: Array) -> Array:
     """-J'(J J' + damping)^-1 r, a control at a bound that pulls outwards left where it is."""
     pull = np.einsum("lnc,ln->lc", at.J, at.r)
-    free = ~(((at.u <= box.low) & (pull > 0)) | ((at.u >= box.high) & (pull < 0)))
-    J = at.J * (free / box.mass)[:, None, :]
-    K = J @ np.swapaxes(at.J, 1, 2)
-    n = K.shape[1]
-    K += (damped * np.trace(K, axis1=1, axis2=2) / n + 1e-300)[:, None, None] * np.eye(n)
-    return np.asarray(-np.einsum("lnc,ln->lc", J, np.linalg.solve(K, at.r[..., None])[..., 0]))
+    free = np.ones(pull.shape, bool)
+    n = at.J.shape[1]
+    for again in range(_FACES):
+        held = free & (((at.u <= box.low) & (pull > 0)) | ((at.u >= box.high) & (pull < 0)))
+        if again and not np.any(held):
+            break
+        free &= ~held
+        K = (at.J * (free / box.mass)[:, None, :]) @ np.swapaxes(at.J, 1, 2)
+        K += (damped * np.trace(K, axis1=1, axis2=2) / n + 1e-300)[:, None, None] * np.eye(n)
+        # what the step itself would push out of the box is held as well, and the step taken without it
+        pull = np.einsum("lnc,ln->lc", at.J, np.linalg.solve(K, at.r[..., None])[..., 0])
+    return np.asarray(-pull * free / box.mass)
 
 
 def _proximal(box: Box, fuel: bool, at: Lanes, y: Array, rho: Array) -> tuple[Array, Array]:

@@ -22,8 +22,6 @@ _AGREEING = 0.01
 _NEAR = 8
 #: Dimension above which a few starts alone descend, and how many.
 LARGE, _SIDE_BY_SIDE = 20, 8
-#: Dimension up to which all starts descend to the end; steps that they take together above it.
-_SMALL, _BEGINNING = 8, 40
 
 
 @dataclass(frozen=True)
@@ -120,23 +118,24 @@ def search(
         order = np.argsort(size, kind="stable")[:_NEAR]
         near = tuple((u[lane], int(variant[lane])) for lane in order)
         return Found(*near[0], float(size[order[0]]), False, np.inf, total, 0, 0, tuple(tried), near)
+    # the cheapest first: those that are side by side later give up as soon as they cannot catch up
+    effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2)) / 2
+    order = np.argsort(effort, kind="stable")
+    arrived, effort = arrived[order], effort[order]
     if task.system.group.dim > LARGE:
-        # a descent takes seconds there: from the cheapest alone, as many as run side by side
-        effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2))
-        arrived = arrived[np.argsort(effort, kind="stable")[:_SIDE_BY_SIDE]]
+        # a descent takes seconds there: as many as run side by side
+        arrived, effort = arrived[:_SIDE_BY_SIDE], effort[:_SIDE_BY_SIDE]
     if settings.descend_iterations == 0:
         # lanes that were left where they are when others had arrived would have to be restored first
-        whole = arrived[size[arrived] <= settings.enough]
-        arrived = whole if len(whole) else arrived
-        effort = np.sum(programme.weight * u[arrived] ** 2, axis=(1, 2)) / 2
-        best = int(np.argmin(effort))
+        whole = size[arrived] <= settings.enough
+        best = int(np.argmax(whole))
         lane = arrived[best]
         return Found(
             u[lane], int(variant[lane]), float(size[lane]), True, float(effort[best]), total, reached, 1, tuple(tried)
         )
-    lower, which = _descended(task, programme, machine, settings, u[arrived], variant[arrived])
+    lower = machine.descend(programme, task.goal(variant[arrived]), u[arrived], settings)
     say(f"descent from {len(arrived)} starts: {int(np.max(lower.used))} steps at most")
-    return _best(lower, which, total, reached, tuple(tried))
+    return _best(lower, variant[arrived], total, reached, tuple(tried))
 
 
 def _nearest_variant(task: Manoeuvre, programme: Programme, u: Array) -> Array:
@@ -145,19 +144,6 @@ def _nearest_variant(task: Manoeuvre, programme: Programme, u: Array) -> Array:
     ends = end.left @ chain_end(programme, u) @ end.right
     away = np.linalg.norm((ends[:, None] - end.value).reshape(len(u), len(end.value), -1), axis=2)
     return np.asarray(np.argmin(away, axis=1))
-
-
-def _descended(
-    task: Manoeuvre, programme: Programme, machine: Machine, settings: Settings, u: Array, variant: Array
-) -> tuple[Reached, Array]:
-    """What controls that arrived descend to, and their variants. Where a descent is long, all take part in its beginning and as
-    many as run side by side, the cheapest, in the rest."""
-    if task.system.group.dim <= _SMALL or settings.descend_iterations <= _BEGINNING or len(u) <= _SIDE_BY_SIDE:
-        return machine.descend(programme, task.goal(variant), u, settings), variant
-    begun = machine.descend(programme, task.goal(variant), u, replace(settings, descend_iterations=_BEGINNING))
-    best = np.argsort(begun.cost, kind="stable")[:_SIDE_BY_SIDE]
-    rest = replace(settings, descend_iterations=settings.descend_iterations - _BEGINNING)
-    return machine.descend(programme, task.goal(variant[best]), begun.u[best], rest), variant[best]
 
 
 def threshold(task: Manoeuvre, settings: Settings) -> float:

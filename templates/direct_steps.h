@@ -1,0 +1,439 @@
+/* Steps towards the goal, and steps that make the controls cheaper while they stay there: of direct_core.c. */
+#ifndef DIRECT_STEPS_H
+#define DIRECT_STEPS_H
+
+#include "direct_chain.h"
+
+enum {
+    FACES = 4,     /* times that a step is taken again without the controls it would push out of the bounds */
+    PATIENCE = 4,  /* steps that all may take, in units of those after which half of the lanes are there */
+    RESTORE = 30,  /* most steps back to the goal; fewer than ten where that can be done at all */
+    CONJUGATE = 12 /* most conjugate gradients of a Newton step: curvatures come in few clusters */
+};
+/* Conjugate gradients end when the square of the slope has fallen to this: the step is restored to the goal and repeated anyhow. */
+#define ENOUGH_CURVED 1e-2
+
+/* The lower triangle of J diag(f) J'. */
+static void gram(const task *w, const V *J, const V *f, V *t, V *A)
+{
+    const int columns = w->columns;
+    int i, j, c;
+    for (i = 0; i < N; ++i) {
+        const V *a = J + (size_t)i * columns;
+        for (c = 0; c < columns; ++c) {
+            t[c] = a[c] * f[c];
+        }
+        for (j = 0; j + 3 <= i; j += 4) {
+            const V *b = J + (size_t)j * columns;
+            V s0 = spread(0.0), s1 = s0, s2 = s0, s3 = s0;
+            for (c = 0; c < columns; ++c) {
+                s0 += t[c] * b[c];
+                s1 += t[c] * b[columns + c];
+                s2 += t[c] * b[2 * columns + c];
+                s3 += t[c] * b[3 * columns + c];
+            }
+            A[i * (i + 1) / 2 + j] = s0;
+            A[i * (i + 1) / 2 + j + 1] = s1;
+            A[i * (i + 1) / 2 + j + 2] = s2;
+            A[i * (i + 1) / 2 + j + 3] = s3;
+        }
+        for (; j <= i; ++j) {
+            const V *b = J + (size_t)j * columns;
+            V sum = spread(0.0);
+            for (c = 0; c < columns; ++c) {
+                sum += t[c] * b[c];
+            }
+            A[i * (i + 1) / 2 + j] = sum;
+        }
+    }
+}
+
+/* z = J'y */
+static void transposed(const task *w, const V *J, const V *y, V *z)
+{
+    int row, c;
+    for (c = 0; c < w->columns; ++c) {
+        z[c] = J[c] * y[0];
+    }
+    for (row = 1; row < N; ++row) {
+        for (c = 0; c < w->columns; ++c) {
+            z[c] += J[(size_t)row * w->columns + c] * y[row];
+        }
+    }
+}
+
+/* F = J x */
+static void times(const task *w, const V *J, const V *x, V *F)
+{
+    int row, c;
+    for (row = 0; row < N; ++row) {
+        V sum = spread(0.0);
+        for (c = 0; c < w->columns; ++c) {
+            sum += J[(size_t)row * w->columns + c] * x[c];
+        }
+        F[row] = sum;
+    }
+}
+
+/*
+ * The next controls of a damped step towards the goal. Levenberg and Marquardt's step is -(J'J + mu)^-1 J'r = -J' (J J' + mu)^-1 r: the
+ * right side solves N equations, the left one as many as there are controls. A slot counts by its length, as in an integral over
+ * time: with M the lengths it is -M^-1 J' (J M^-1 J' + mu)^-1 r. A control at a bound that the slope, or the step itself, would push out of it
+ * is held, and the step taken again without it: clipped instead, it would leave a residual, and steps gain a digit each, not two.
+ */
+static void damped_step(task *w, const point *at, V lambda, V *next)
+{
+    const programme *p = w->p;
+    const V zero = {0.0};
+    V A[PACKED], inverse[N], y[N], trace, shift;
+    int c, i, again;
+    transposed(w, at->J, at->r, w->z);
+    for (c = 0; c < w->columns; ++c) {
+        w->f[c] = spread(1.0 / p->mass[c / M]);
+    }
+    for (again = 0; again < FACES; ++again) {
+        Mask met = LESS(zero, zero);
+        for (c = 0; c < w->columns; ++c) {
+            const V low = spread(p->low[c]), high = spread(p->high[c]);
+            const Mask down = NOT(LESS(low, at->u[c])) & LESS(zero, w->z[c]);
+            const Mask up = NOT(LESS(at->u[c], high)) & LESS(w->z[c], zero);
+            const Mask held = (down | up) & LESS(zero, w->f[c]);
+            met |= held;
+            w->f[c] = SELECT(held, zero, w->f[c]);
+        }
+        if (again > 0 && !any(met)) {
+            break;
+        }
+        gram(w, at->J, w->f, w->t, A);
+        trace = zero;
+        for (i = 0; i < N; ++i) {
+            trace += A[i * (i + 1) / 2 + i];
+        }
+        shift = lambda * trace * (1.0 / N) + 1e-300;
+        for (i = 0; i < N; ++i) {
+            A[i * (i + 1) / 2 + i] += shift;
+            y[i] = at->r[i];
+        }
+        factor(A, inverse);
+        substitute(A, inverse, y);
+        transposed(w, at->J, y, w->z);
+    }
+    for (c = 0; c < w->columns; ++c) {
+        const V wanted = at->u[c] - w->f[c] * w->z[c];
+        next[c] = least(largest(wanted, spread(p->low[c])), spread(p->high[c]));
+    }
+}
+
+static void take(const task *w, Mask where, point *to, const point *from)
+{
+    int i;
+    to->size = SELECT(where, from->size, to->size);
+    for (i = 0; i < N; ++i) {
+        to->r[i] = SELECT(where, from->r[i], to->r[i]);
+    }
+    for (i = 0; i < w->columns; ++i) {
+        to->u[i] = SELECT(where, from->u[i], to->u[i]);
+    }
+    for (i = 0; i < N * w->columns; ++i) {
+        to->J[i] = SELECT(where, from->J[i], to->J[i]);
+    }
+}
+
+/*
+ * Levenberg and Marquardt's steps from at->u, projected on the bounds, in lanes of `active`: the normal matrix is that of
+ * the goal (N x N), not that of the controls. Ends when `wanted` lanes are there. Adds the steps of each lane to `used`.
+ */
+static void arrive(task *w, point *at, Mask active, int iterations, double enough, double damping, int wanted, int *used)
+{
+    V lambda = spread(damping);
+    int step, l;
+    linearise(w, at);
+    for (step = 0; step < iterations; ++step) {
+        const Mask open = active & LESS(spread(enough), at->size) & LESS(lambda, spread(1e8));
+        Mask better;
+        int there = 0;
+        for (l = 0; l < LANES; ++l) {
+            there += LANE(at->size, l) <= enough;
+        }
+        if (!any(open) || there >= wanted) {
+            return;
+        }
+        if (2 * there >= LANES && iterations > PATIENCE * (step + 1)) {
+            iterations = PATIENCE * (step + 1); /* enough to go on with: nobody waits for ever for a start that stalls */
+        }
+        damped_step(w, at, lambda, w->trial.u);
+        linearise(w, &w->trial);
+        better = open & LESS(w->trial.size, at->size);
+        take(w, better, at, &w->trial);
+        lambda = SELECT(better, largest(0.2 * lambda, spread(1e-13)), 6.0 * lambda);
+        for (l = 0; l < LANES; ++l) {
+            used[l] += LANE(open, l) != 0;
+        }
+    }
+}
+
+/*
+ * Undamped steps that bring controls near the goal back to it, in lanes of `active`. The derivative is kept as long as the residual
+ * falls to a quarter, since a residual alone costs an eighth; where it does not fall with a new derivative, a lane gives up.
+ */
+static void restore(task *w, point *at, Mask active)
+{
+    int step, i, c, fresh = 1;
+    linearise(w, at);
+    for (step = 0; step < RESTORE; ++step) {
+        const Mask open = active & LESS(spread(w->p->enough), at->size);
+        Mask better;
+        int slow;
+        if (!any(open)) {
+            break;
+        }
+        damped_step(w, at, spread(1e-9), w->trial.u);
+        examine(w, &w->trial);
+        better = open & LESS(w->trial.size, at->size);
+        slow = any(open & NOT(LESS(w->trial.size, 0.25 * at->size)));
+        active &= NOT(open) | better | (fresh ? NOT(open) : open);
+        at->size = SELECT(better, w->trial.size, at->size);
+        for (i = 0; i < N; ++i) {
+            at->r[i] = SELECT(better, w->trial.r[i], at->r[i]);
+        }
+        for (c = 0; c < w->columns; ++c) {
+            at->u[c] = SELECT(better, w->trial.u[c], at->u[c]);
+        }
+        fresh = slow;
+        if (slow) {
+            linearise(w, at);
+        }
+    }
+    if (!fresh) {
+        linearise(w, at);
+    }
+}
+
+/* Energy 1/2 sum w u^2, or fuel sum w |u|; every slot counts by its length. */
+static V objective(const task *w, const V *u)
+{
+    const programme *p = w->p;
+    V sum = spread(0.0);
+    int c;
+    for (c = 0; c < w->columns; ++c) {
+        const double scale = p->mass[c / M] * p->weight[c];
+        sum += p->fuel ? scale * largest(u[c], -u[c]) : 0.5 * scale * u[c] * u[c];
+    }
+    return sum;
+}
+
+/* The controls that belong to the multipliers y, which of them are free to move (f: by how much), and what J v misses. */
+static void primal(task *w, const point *at, V rho, const V *y, const V *want, V *v, V *F)
+{
+    const programme *p = w->p;
+    const V zero = {0.0}, inverse = 1.0 / rho;
+    int c, row;
+    transposed(w, at->J, y, w->z);
+    for (c = 0; c < w->columns; ++c) {
+        const double per = 1.0 / p->mass[c / M];
+        const V low = spread(p->low[c]), high = spread(p->high[c]);
+        V value, rate;
+        if (p->fuel) { /* w |v| + rho/2 (v - s)^2 is least at s drawn towards zero by w / rho, and at zero where s is nearer than that */
+            const V s = at->u[c] + per * inverse * w->z[c], t = p->weight[c] * inverse;
+            value = SELECT(LESS(t, s), s - t, SELECT(LESS(s, -t), s + t, zero));
+            rate = SELECT(LESS(t, s) | LESS(s, -t), inverse, zero);
+        } else {
+            rate = 1.0 / (p->weight[c] + rho);
+            value = (per * w->z[c] + rho * at->u[c]) * rate;
+        }
+        /* dv/dy: none at a bound. There and at the corners of |v| the derivative is one of several, which semismooth Newton allows. */
+        w->f[c] = SELECT(LESS(low, value) & LESS(value, high), per * rate, zero);
+        v[c] = least(largest(value, low), high);
+    }
+    times(w, at->J, v, F);
+    for (row = 0; row < N; ++row) {
+        F[row] -= want[row];
+    }
+}
+
+static V length(const V *F)
+{
+    V sum = spread(0.0);
+    int i;
+    for (i = 0; i < N; ++i) {
+        sum += F[i] * F[i];
+    }
+    return root(sum);
+}
+
+/*
+ * min objective(v) + rho/2 |v - u|^2 over the bounds with J v = J u - r, by semismooth Newton's method on the dual: N unknowns
+ * y, whatever the number of controls. The step is halved until the equations' residual falls.
+ */
+static void proximal(task *w, const point *at, V rho, V *y, V *v)
+{
+    const programme *p = w->p;
+    V want[N], F[N], trace = spread(0.0), norm;
+    int c, i, round, half;
+    times(w, at->J, at->u, want);
+    for (i = 0; i < N; ++i) {
+        want[i] -= at->r[i];
+    }
+    for (i = 0; i < N; ++i) {
+        for (c = 0; c < w->columns; ++c) {
+            const V entry = at->J[(size_t)i * w->columns + c];
+            trace += (1.0 / p->mass[c / M]) * entry * entry;
+        }
+    }
+    primal(w, at, rho, y, want, v, F);
+    norm = length(F);
+    for (round = 0; round < 30; ++round) {
+        V A[PACKED], inverse[N], step[N], t = spread(1.0);
+        Mask open = LESS(spread(1e-13), norm), moved = open ^ open;
+        if (!any(open)) {
+            return;
+        }
+        gram(w, at->J, w->f, w->t, A);
+        for (i = 0; i < N; ++i) {
+            A[i * (i + 1) / 2 + i] += 1e-10 * trace + 1e-300;
+            step[i] = -F[i];
+        }
+        factor(A, inverse);
+        substitute(A, inverse, step);
+        for (half = 0; half < 8 && any(open); ++half) {
+            V other[N], G[N], found;
+            Mask falls;
+            for (i = 0; i < N; ++i) {
+                other[i] = y[i] + SELECT(open, t, spread(0.0)) * step[i];
+            }
+            primal(w, at, rho, other, want, v, G);
+            found = length(G);
+            falls = open & LESS(found, norm);
+            for (i = 0; i < N; ++i) {
+                y[i] = SELECT(falls, other[i], y[i]);
+                F[i] = SELECT(falls, G[i], F[i]);
+            }
+            norm = SELECT(falls, found, norm);
+            moved |= falls;
+            open &= NOT(falls);
+            t *= 0.5;
+        }
+        primal(w, at, rho, y, want, v, F); /* f and v of the y that was kept, in every lane */
+        if (!any(moved)) {
+            return;
+        }
+    }
+}
+
+/* y that leaves least of s - J'y in the free controls (f: their inverse lengths, zero where held), and z = f (s - J'y). */
+static void project(const task *w, const V *J, const V *L, const V *inverse, const V *s, V *y, V *z)
+{
+    int c;
+    for (c = 0; c < w->columns; ++c) {
+        z[c] = w->f[c] * s[c];
+    }
+    times(w, J, z, y);
+    substitute(L, inverse, y);
+    transposed(w, J, y, z);
+    for (c = 0; c < w->columns; ++c) {
+        z[c] = w->f[c] * (s[c] - z[c]);
+    }
+}
+
+static V inner(const task *w, const V *a, const V *b)
+{
+    V sum = spread(0.0);
+    int c;
+    for (c = 0; c < w->columns; ++c) {
+        sum += a[c] * b[c];
+    }
+    return sum;
+}
+
+/* Curvature of the Lagrange function along d, less that of the energy: a difference of its slopes, of which g is that at u. */
+static void bend(task *w, const V *u, const V *row, const V *d, V *moved, V *curved)
+{
+    V widest = spread(0.0), step;
+    int c;
+    for (c = 0; c < w->columns; ++c) {
+        widest = largest(widest, largest(d[c], -d[c]));
+    }
+    step = 1e-6 / (widest + 1e-12);
+    for (c = 0; c < w->columns; ++c) {
+        moved[c] = u[c] + step * d[c];
+    }
+    slope(w, moved, row, curved);
+    for (c = 0; c < w->columns; ++c) {
+        curved[c] = (curved[c] - w->g[c]) / step;
+    }
+}
+
+/*
+ * Newton's step of the least energy on the goal, from controls u that reach it: the proximal step first, which tells which
+ * controls go to their bounds and what the multipliers y are, then conjugate gradients on the Lagrange function's second
+ * derivative in the others, on the linearised goal. Where the curvature is negative they end. Returns the gain to expect.
+ */
+static V newton(task *w, point *at, V rho, V sigma, V *y, V *v)
+{
+    const programme *p = w->p;
+    const V zero = {0.0};
+    V A[PACKED], inverse[N], row[ENTRIES], trace = zero, first, size, slack[N], gain = zero;
+    Mask open;
+    int c, i, e, step;
+    examine(w, at); /* for the rows Z that belong to J */
+    proximal(w, at, rho, y, v);
+    for (c = 0; c < w->columns; ++c) {
+        w->f[c] = SELECT(LESS(zero, w->f[c]), spread(1.0 / p->mass[c / M]), zero);
+        w->x[c] = v[c] - at->u[c];
+    }
+    gram(w, at->J, w->f, w->t, A);
+    for (i = 0; i < N; ++i) {
+        trace += A[i * (i + 1) / 2 + i];
+    }
+    for (i = 0; i < N; ++i) {
+        A[i * (i + 1) / 2 + i] += 1e-13 * trace + 1e-300;
+    }
+    factor(A, inverse);
+    for (e = 0; e < ENTRIES; ++e) {
+        row[e] = zero;
+    }
+    for (i = 0; i < N; ++i) {
+        for (e = 0; e < ENTRIES; ++e) {
+            row[e] += y[i] * w->Z[i * ENTRIES + e];
+        }
+    }
+    slope(w, at->u, row, w->g);
+    bend(w, at->u, row, w->x, w->d, w->t);
+    for (c = 0; c < w->columns; ++c) {
+        w->s[c] = w->g[c] + w->t[c] - p->mass[c / M] * (p->weight[c] * (at->u[c] + w->x[c]) + sigma * w->x[c]);
+    }
+    project(w, at->J, A, inverse, w->s, slack, w->z);
+    memcpy(w->d, w->z, (size_t)w->columns * sizeof *w->d);
+    size = first = inner(w, w->s, w->z);
+    open = LESS(zero, first);
+    for (step = 0; step < CONJUGATE && any(open); ++step) {
+        V bent, rate, next;
+        bend(w, at->u, row, w->d, v, w->t);
+        for (c = 0; c < w->columns; ++c) {
+            w->t[c] = p->mass[c / M] * (p->weight[c] + sigma) * w->d[c] - w->t[c];
+        }
+        bent = inner(w, w->d, w->t);
+        open &= LESS(zero, bent);
+        rate = SELECT(open, size / bent, zero);
+        for (c = 0; c < w->columns; ++c) {
+            w->x[c] += rate * w->d[c];
+            w->s[c] -= rate * w->t[c];
+        }
+        project(w, at->J, A, inverse, w->s, slack, w->z);
+        next = inner(w, w->s, w->z);
+        open &= LESS(ENOUGH_CURVED * first, next);
+        rate = SELECT(open, next / size, zero);
+        for (c = 0; c < w->columns; ++c) {
+            w->d[c] = w->z[c] + rate * w->d[c];
+        }
+        size = next;
+    }
+    for (c = 0; c < w->columns; ++c) {
+        const double weight = p->mass[c / M] * p->weight[c];
+        gain += 0.5 * w->x[c] * (w->s[c] - weight * at->u[c] + w->g[c]);
+        v[c] = at->u[c] + w->x[c];
+    }
+    return gain;
+}
+
+#endif
