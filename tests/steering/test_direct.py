@@ -326,7 +326,7 @@ def test_a_descent_ends_at_the_bottom_of_a_flat_valley_within_bounds() -> None:
 
 
 def test_controls_that_a_step_pushes_out_of_the_box_are_held_at_once() -> None:
-    """Starts for a gate at a bound that most controls meet: 44 of 96 arrived within 150 steps where they were clipped, now 59."""
+    """Starts for a gate at a bound that most controls meet: 44 of 96 arrived within 150 steps where they were clipped, now 56."""
     two = lc.pauli(2)
     rows = [two.labels.index(label) for label in ("XI", "YI", "IX", "IY")]
     drift = np.eye(15)[two.labels.index("ZZ")]
