@@ -1,8 +1,10 @@
-"""The check of an array's shape: what is refused is named, with the shape that is taken."""
+"""Checks of the shape of an array and of the length of a list: what is refused is named, with what is taken."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import EllipsisType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,3 +29,16 @@ def shaped(value: ArrayLike, shape: tuple[int | str | EllipsisType, ...], where:
     if len(own) != len(last) or any(isinstance(n, int) and n != m for n, m in zip(last, own, strict=True)):
         raise ShapeError(f"{where} has shape {array.shape}; give {text}")
     return array
+
+
+def entries_of(value: Any, count: int, where: str) -> list[Any]:
+    """The entries of a list, a tuple, an array or a SymPy vector of so many, numbers or texts as they are.
+
+    Raises:
+        ShapeError: naming `where`: it is none, or holds another number of them.
+    """
+    of_sympy = getattr(value, "flat", None)  # a method there, an iterator of numpy's
+    rows = of_sympy() if callable(of_sympy) else value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(rows, str) or not isinstance(rows, Sequence) or len(rows) != count:
+        raise ShapeError(f"{where} must hold {count} entries, given {value!r:.80}")
+    return list(rows)

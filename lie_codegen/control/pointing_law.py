@@ -16,7 +16,7 @@ from typing import Any
 
 from lie_codegen.control.attitude import gyroscopic_factor
 from lie_codegen.control.attitude_ports import random_rotation
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number, real_number
 from lie_codegen.groups.maps.admission import NEAR_GROUP
 from lie_codegen.groups.maps.guard import kept_where
@@ -26,6 +26,7 @@ from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, cross, dot, matvec, minus, negative, number, plus, scaled
 from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, sample_inputs, values_of
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.shapes import entries_of
 
 _SPINS = ("damped", "free")
 
@@ -118,9 +119,7 @@ def _drawn(rng: random.Random) -> list[float]:
 
 
 def _unit(value: Sequence[Any], name: str) -> list[sp.Expr]:
-    if len(value) != 3:
-        raise ShapeError(f"{name} has {len(value)} entries; give three")
-    exact = [real_number(entry, f"{name}[{i}]") for i, entry in enumerate(value)]
+    exact = [real_number(entry, f"{name}[{i}]") for i, entry in enumerate(entries_of(value, 3, name))]
     length = sp.sqrt(sum(entry**2 for entry in exact))
     if length == 0:
         raise InputError(f"{name} is zero; give a direction")

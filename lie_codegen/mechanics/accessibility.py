@@ -30,6 +30,7 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.connection import metric_of, symmetric_product
 from lie_codegen.mechanics.euler_poincare import euler_poincare, velocity_symbols
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.shapes import entries_of
 
 _DEGREE = 4
 #: Levels of brackets, products or derivatives: each has several times the terms of the one before.
@@ -137,7 +138,8 @@ def accessibility_rank(
     zero = [sp.S.Zero] * n
     drift = (list(symbols), euler_poincare(algebra, inertia, symbols))
     controls = [(zero, list(inertia.inv() * sp.Matrix(force))) for force in force_vectors(algebra, forces)]
-    point = dict(zip(symbols, zero if xi is None else [exact_number(x) for x in xi], strict=True))
+    velocity = zero if xi is None else [exact_number(x) for x in entries_of(xi, n, "accessibility_rank: xi")]
+    point = dict(zip(symbols, velocity, strict=True))
     layer, found = [drift, *controls], [drift, *controls]
     for _ in range(depth):
         layer = [_field_bracket(algebra, symbols, f, g) for f in (drift, *controls) for g in layer]
@@ -184,8 +186,7 @@ def direction_observability(
         InputError: derivatives outside 0 to 12.
     """
     derivatives = count_between(derivatives, 0, _MOST_LEVELS, "direction_observability: derivatives")
-    if len(y) != 3 or len(omega) != 3:
-        raise ShapeError("y and omega have three entries each")
+    y, omega = entries_of(y, 3, "direction_observability: y"), entries_of(omega, 3, "direction_observability: omega")
     inertia = inertia if isinstance(inertia, sp.MatrixBase) else positive_matrix(inertia, 3, "inertia")
     ys, ws = sp.symbols("y1:4", real=True), sp.symbols("w1:4", real=True)
     Y, W = sp.Matrix(ys), sp.Matrix(ws)
@@ -211,16 +212,17 @@ def force_vectors(algebra: LieAlgebra, forces: Sequence[Sequence[sp.Expr] | str]
     Raises:
         ShapeError, InputError: as the callers say.
     """
-    if not forces:
+    if isinstance(forces, str) or not hasattr(forces, "__len__"):
+        raise ShapeError(f"forces must be a list of covectors or labels, given {forces!r:.80}")
+    if not len(forces):
         raise InputError("give at least one force")
     result = []
     for force in forces:
         if isinstance(force, str):
             result.append([sp.Integer(int(k == algebra.index(force))) for k in range(algebra.dim)])
             continue
-        if len(force) != algebra.dim:
-            raise ShapeError(f"a force on {algebra.name} has {algebra.dim} entries, got {len(force)}")
-        result.append([exact_number(x) for x in force])
+        covector = entries_of(force, algebra.dim, f"a force on {algebra.name}")
+        result.append([exact_number(x) for x in covector])
     return result
 
 

@@ -15,7 +15,6 @@ from itertools import product
 from typing import Any
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
-from lie_codegen.errors import ShapeError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_algebra
@@ -23,6 +22,7 @@ from lie_codegen.kernel.brackets import ad_star, bracket
 from lie_codegen.kernel.linear import plus
 from lie_codegen.mechanics.euler_poincare import EXACT
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.shapes import entries_of
 
 
 def connection(algebra: LieAlgebra, inertia: sp.MatrixBase) -> tuple[sp.ImmutableMatrix, ...]:
@@ -52,11 +52,8 @@ def symmetric_product(group: GroupLike | LieAlgebra, inertia: Any, x: Sequence[A
     """
     algebra = as_algebra(group, "symmetric_product")
     inertia = metric_of(algebra, inertia)
+    x, y = (entries_of(each, algebra.dim, f"symmetric_product: {name}") for each, name in ((x, "x"), (y, "y")))
     x, y = ([entry if isinstance(entry, sp.Expr) else exact_number(entry) for entry in each] for each in (x, y))
-    if len(x) != algebra.dim or len(y) != algebra.dim:
-        raise ShapeError(
-            f"symmetric_product: x and y have {len(x)} and {len(y)} entries; {algebra.name} has {algebra.dim}"
-        )
     inverse = inertia.inv()
     a, b = (_nabla(algebra, inertia, inverse, *pair) for pair in ((x, y), (y, x)))
     return [sp.expand(p + q) for p, q in zip(a, b, strict=True)]

@@ -18,6 +18,7 @@ from lie_codegen.mechanics.relative_equilibria import NewtonMethod
 from lie_codegen.rigid_body.euler_average import EulerAverage
 from lie_codegen.rigid_body.free_rigid_body import check_slow
 from lie_codegen.rigid_body.principal_body import TAU
+from lie_codegen.shapes import entries_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,7 +119,9 @@ def slow_equilibria(
         InputError: the flow is degenerate there, as for homogeneous g: use `limit_cycles`.
     """
     run = _slow_field(flow, tau, eps)
-    spins, moduli = np.meshgrid(np.linspace(*Omega_range, 24), np.linspace(*k_range, 24), indexing="ij")
+    slowest, fastest = (float(each) for each in entries_of(Omega_range, 2, "slow_equilibria: Omega_range"))
+    least, most = (float(each) for each in entries_of(k_range, 2, "slow_equilibria: k_range"))
+    spins, moduli = np.meshgrid(np.linspace(slowest, fastest, 24), np.linspace(least, most, 24), indexing="ij")
     values = np.stack(flow.averaged(spins, moduli, tau)[:2])
     if eps is not None:
         values = values + eps * np.stack(flow.second_order(spins, moduli, tau)[:2])
@@ -126,7 +129,7 @@ def slow_equilibria(
     found: list[SlowEquilibrium] = []
     for i, j in zip(*np.nonzero(change), strict=True):
         x = run.from_guess(np.array([spins[i : i + 2, j].mean(), moduli[i, j : j + 2].mean()]))
-        if x is None or not (Omega_range[0] <= x[0] <= Omega_range[1] and k_range[0] <= x[1] <= k_range[1]):
+        if x is None or not (slowest <= x[0] <= fastest and least <= x[1] <= most):
             continue
         if any(abs(e.Omega - x[0]) + abs(e.k - x[1]) < 1e-7 for e in found):
             continue

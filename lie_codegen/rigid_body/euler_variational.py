@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.rigid_body.principal_body import TAU, PrincipalBody
+from lie_codegen.shapes import entries_of
 
 OMEGA, K_MODULUS, K_INTEGRAL, S_MEAN = sp.symbols("Omega k K S", positive=True)
 SN, CN, DN, ZETA = sp.symbols("sn cn dn z", real=True)
@@ -177,11 +178,15 @@ def moving_parts(
         ShapeError: torques, gains or products of other shapes.
     """
     names = {"tau": TAU}
-    none = [0, 0, 0]
-    torque = [formula(v, names, "torque") for v in _three(torques, none, "torques")]
-    rows = [_three(row, none, "a row of gains") for row in _three(gains, [none] * 3, "gains")]
+
+    def three(value: Any, default: Any, what: str) -> list[Any]:
+        return entries_of(default if value is None else value, 3, f"moving_parts: {what}")
+
+    none = (0, 0, 0)
+    torque = [formula(v, names, "torque") for v in three(torques, none, "torques")]
+    rows = [three(row, none, "a row of gains") for row in three(gains, (none,) * 3, "gains")]
     gain = sp.Matrix(3, 3, [formula(v, names, "gain") for row in rows for v in row])
-    p12, p13, p23 = (formula(v, names, "product of inertia") for v in _three(products, none, "products"))
+    p12, p13, p23 = (formula(v, names, "product of inertia") for v in three(products, none, "products"))
     product = {frozenset((0, 1)): p12, frozenset((0, 2)): p13, frozenset((1, 2)): p23}
     w, a, inertia = _RATES, _ACCELERATIONS, body.inertia
     terms = []
@@ -195,11 +200,3 @@ def moving_parts(
         linear = sum(gain[n, j] * w[j] for j in range(3)) - sp.diff(inertia[n], TAU) / inertia[n] * w[n]
         terms.append(torque[n] + linear + internal / inertia[n])
     return terms[0], terms[1], terms[2]
-
-
-def _three(value: Any, default: list[Any], what: str) -> list[Any]:
-    if value is None:
-        return default
-    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 3:
-        raise ShapeError(f"moving_parts: {what} must hold three entries, given {value!r:.60}")
-    return list(value)

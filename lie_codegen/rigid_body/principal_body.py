@@ -21,6 +21,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.formulas import formula, quantity
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.shapes import entries_of
 
 #: The slow time eps t, on which moments of inertia and perturbations may depend.
 TAU = sp.Symbol("tau", real=True)
@@ -120,13 +121,14 @@ def principal_body(
 
     Raises:
         InputError: for another axis, and as `PrincipalBody`.
+        ShapeError: moments, signs or rates that are not three.
     """
-    if isinstance(inertia, str) or len(inertia) != 3:
-        raise InputError(f"inertia {inertia!r}: three principal moments are needed")
-    moments = [formula(value, {"tau": TAU}, f"inertia {n + 1}") for n, value in enumerate(inertia)]
+    given = entries_of(inertia, 3, "inertia")
+    moments = [formula(value, {"tau": TAU}, f"inertia {n + 1}") for n, value in enumerate(given)]
     if rates is not None:
         moments = [
-            m + quantity(rate, f"rate {n + 1}") * TAU for n, (m, rate) in enumerate(zip(moments, rates, strict=True))
+            m + quantity(rate, f"rate {n + 1}") * TAU
+            for n, (m, rate) in enumerate(zip(moments, entries_of(rates, 3, "rates"), strict=True))
         ]
     start = [float(value.subs(TAU, 0)) for value in moments]
     check_moments(start)
@@ -139,7 +141,7 @@ def principal_body(
     even = (first, middle, third) in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
     axes = ((first, 1), (middle, 1 if even else -1), (third, 1))
     a, b, c = moments
-    return PrincipalBody((a, b, c), axes, tuple(int(s) for s in signs))  # type: ignore[arg-type]
+    return PrincipalBody((a, b, c), axes, tuple(int(s) for s in entries_of(signs, 3, "signs")))  # type: ignore[arg-type]
 
 
 def check_moments(moments: Sequence[float]) -> None:

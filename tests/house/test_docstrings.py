@@ -134,6 +134,10 @@ STATED: list[tuple[str, str, Callable[[], Any]]] = [
     ("MomentumWheels.body_rate", "ShapeError", lambda: _wheels().body_rate(np.ones(3))),
     ("MomentumWheels.body_areas", "ShapeError", lambda: _wheels().body_areas(np.eye(3))),
     ("simulate_driven", "ShapeError", lambda: lc.simulate_driven("so3", abs, np.ones(3), t=[0, 1])),
+    ("accessibility_rank", "ShapeError", lambda: lc.accessibility_rank("so3", 1, 1.0)),  # type: ignore[arg-type]
+    ("accessibility_rank", "ShapeError", lambda: lc.accessibility_rank("so3", 1, ["w1"], xi=[1, 2])),
+    ("direction_observability", "ShapeError", lambda: lc.direction_observability(1, 0, [0, 0, 1])),  # type: ignore[arg-type]
+    ("principal_body", "ShapeError", lambda: lc.principal_body([1, 2, 2.5], rates=1)),
     ("coning_angles", "ShapeError", lambda: lc.coning_angles(_body(), [1, 2])),
     ("coning_bounds", "InputError", lambda: lc.coning_bounds(_body(), 2.0)),
     ("elliptic_kernels", "IdentifierError", lambda: lc.elliptic_kernels("a b")),
@@ -160,7 +164,9 @@ STATED: list[tuple[str, str, Callable[[], Any]]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "error", "call"), STATED, ids=[f"{name}-{error}" for name, error, _ in STATED])
+@pytest.mark.parametrize(
+    ("name", "error", "call"), STATED, ids=[f"{name}-{error}-{k}" for k, (name, error, _) in enumerate(STATED)]
+)
 def test_what_is_stated_is_raised(name: str, error: str, call: Callable[[], Any]) -> None:
     assert re.search(rf"\b{error}\b", raises(inspect.getdoc(EVERY[name]) or "")), f"{name} does not state {error}"
     with pytest.raises(errors.LieCodegenError) as raised:

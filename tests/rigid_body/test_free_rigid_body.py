@@ -120,7 +120,7 @@ def test_refusals_say_why():
         (lambda: free_rigid_body((3, 4, 4.002)), "harmonic oscillator"),
         (lambda: free_rigid_body((1, 2, 4)), "above the sum of the other two"),
         (lambda: free_rigid_body((0, 4, 5)), "positive"),
-        (lambda: free_rigid_body((3, 4)), "three principal moments"),
+        (lambda: free_rigid_body((3, 4)), "inertia must hold 3 entries"),
         (lambda: free_rigid_body((3, 4, 5), signs=(1, 1, 1)), "product is -1"),
         (lambda: free_rigid_body((3, 4, 5), axis="mid"), "'max' or 'min'"),
         (lambda: free_rigid_body((3, 4, "5 + t")), "no name 't'"),
