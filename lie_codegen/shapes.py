@@ -19,16 +19,20 @@ def shaped(value: ArrayLike, shape: tuple[int | str | EllipsisType, ...], where:
     Raises:
         ShapeError: naming `where`: no numbers, or another shape, with the one that is taken.
     """
-    text = str(tuple(shape)).replace("Ellipsis", "...").replace("'", "")
     try:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise ShapeError(f"{where} must be numbers of shape {text}, given {value!r:.60}") from None
-    last = shape[1:] if shape[:1] == (...,) else shape
-    own = array.shape[max(0, array.ndim - len(last)) :] if last is not shape else array.shape
-    if len(own) != len(last) or any(isinstance(n, int) and n != m for n, m in zip(last, own, strict=True)):
-        raise ShapeError(f"{where} has shape {array.shape}; give {text}")
+        raise ShapeError(f"{where} must be numbers of shape {_written(shape)}, given {value!r:.60}") from None
+    open_ended = shape[:1] == (...,)
+    last = shape[1:] if open_ended else shape
+    own = array.shape[max(0, array.ndim - len(last)) :] if open_ended else array.shape
+    if len(own) != len(last) or any(n != m for n, m in zip(last, own, strict=True) if not isinstance(n, str)):
+        raise ShapeError(f"{where} has shape {array.shape}; give {_written(shape)}")
     return array
+
+
+def _written(shape: tuple[int | str | EllipsisType, ...]) -> str:
+    return str(shape).replace("Ellipsis", "...").replace("'", "")
 
 
 def entries_of(value: Any, count: int, where: str) -> list[Any]:

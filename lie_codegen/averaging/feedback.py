@@ -33,6 +33,7 @@ from lie_codegen.kernel.expressions import expression_body
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.shapes import shaped
 from lie_codegen.signals.input_formulas import period_of
 from lie_codegen.signals.signal_values import expressions_of
 from lie_codegen.signals.trig_formula import NotTrigonometricError, trig_form
@@ -104,9 +105,7 @@ class FeedbackAverage(Saved):
         Raises:
             InputError: if g is not an equilibrium of the averaged system, or a parameter has no value.
         """
-        point = np.asarray(g, dtype=float)
-        if point.shape != (self.group.dim,):
-            raise ShapeError(f"linearise: g has shape {point.shape}; it must be ({self.group.dim},)")
+        point = shaped(g, (self.group.dim,), "linearise: g")
         numbers = self._numbers(values)
         residual = self._rate_at(numbers)(point)
         if np.max(np.abs(residual)) > 1e-8:
@@ -142,9 +141,7 @@ class FeedbackAverage(Saved):
             InputError: bad eps or horizon, or a parameter without a value. ChartError: a solution leaves the chart.
         """
         numbers = self._numbers(values)
-        start = np.asarray(g0, dtype=float)
-        if start.shape != (self.group.dim,):
-            raise ShapeError(f"order_check: g0 has shape {start.shape}; it must be ({self.group.dim},)")
+        start = shaped(g0, (self.group.dim,), "order_check: g0")
         given = {str(name): float(value) for name, value in numbers.items()}
         period = float(self.period.subs(numbers))
         chosen = different_scales("order_check", period, eps, horizon)

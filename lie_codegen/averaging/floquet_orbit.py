@@ -16,13 +16,14 @@ from lie_codegen.averaging.orbit_kernels import formula_orbit_kernels, kernel_or
 from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, eigenvalues, found_orbit
 from lie_codegen.averaging.vector_field import read_formulas
 from lie_codegen.control.loop_result import ClosedLoop
-from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.build import build
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.ode import Motion
 from lie_codegen.runtime.rows import row_by_row
+from lie_codegen.shapes import shaped
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -219,9 +220,7 @@ def _is_driven(rates: Any, kernels: tuple[Kernel, ...]) -> bool:
 def _start(guess: ArrayLike | None, n: int) -> Array:
     if guess is None:
         raise InputError("floquet: guess=, a point near the orbit, is needed")
-    start = np.array(guess, dtype=float)
-    if start.shape != (n,):
-        raise ShapeError(f"floquet: the guess has shape {start.shape}; there are {n} variables")
+    start = shaped(guess, (n,), "floquet: guess")
     if not np.all(np.isfinite(start)):
         raise NotFiniteError("floquet: the guess holds NaN or infinity")
     return start

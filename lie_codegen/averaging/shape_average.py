@@ -20,7 +20,7 @@ from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.gait_path import gait_path
 from lie_codegen.averaging.shape_form import ShapeForm
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import InputError
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.runge_kutta import ARRAYS, CLASSICAL, increment
@@ -28,6 +28,7 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.advected import Advected
 from lie_codegen.mechanics.polynomial_fields import Field, PullBackSpace, gathered, integrated
 from lie_codegen.mechanics.polynomial_kernels import evaluate
+from lie_codegen.shapes import shaped
 from lie_codegen.signals.floquet_magnus import Calculus, floquet_magnus
 
 _MOST = 10
@@ -191,9 +192,7 @@ def _with_momentum(
         raise InputError(
             "average: a stored momentum is seen from the body's own frame; average the connection as it was given"
         )
-    mu = np.asarray(momentum, dtype=float)
-    if mu.shape != (n,):
-        raise ShapeError(f"momentum has shape {mu.shape}; {group.name} needs ({n},)")
+    mu = shaped(momentum, (n,), "momentum")
     space = _space(group, order, T)
     inverse = series_on_circle(connection.locked_inverse, middle, s, order, connection.shape)
     own = np.arange(n, dtype=np.int64)

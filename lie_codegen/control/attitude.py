@@ -25,9 +25,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lie_codegen.errors import InputError, NotFiniteError, ShapeError
+from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.exact.positive_matrix import as_floats, eigenvalues, positive_matrix, positive_number
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.shapes import shaped
 
 #: c' of the torque's gyroscopic term, by name.
 GYROSCOPIC = {"cancel": 1, "none": 0, "double": -1}
@@ -136,9 +137,7 @@ def gains_for_response(inertia: Any, *, bandwidth: Any, damping: Any = 0.7, size
 
 
 def _three(value: ArrayLike, what: str) -> np.ndarray:
-    array = np.asarray(value, dtype=float)
-    if array.shape != (3,):
-        raise ShapeError(f"{what} has shape {array.shape}; give three numbers")
+    array = shaped(value, (3,), what)
     if not np.all(np.isfinite(array)):
         raise NotFiniteError(f"{what} holds NaN or infinity")
     return array

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
-from lie_codegen.errors import InputError, NotOnGroupError, ShapeError
+from lie_codegen.errors import InputError, NotOnGroupError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import NEAR_GROUP, ON_GROUP
 from lie_codegen.groups.maps.quaternion import quaternion_order, rotation_entries
@@ -88,9 +88,7 @@ def jacobian_to(library: str, group: MatrixGroup, J: ArrayLike) -> Array:
     Raises:
         InputError, ShapeError: as `tangent_to`.
     """
-    matrix = np.asarray(J, dtype=float)
-    if matrix.shape[-2:] != (group.dim, group.dim):
-        raise ShapeError(f"J has shape {matrix.shape}; its last axes must be ({group.dim}, {group.dim})")
+    matrix = shaped(J, (..., group.dim, group.dim), "J")
     order = _permutation(library, group)
     return matrix[..., order, :][..., order]
 
@@ -142,9 +140,7 @@ def quaternion_from_rotation(R: ArrayLike, *, order: str | None = None) -> Array
         ShapeError: the last axes are not (3, 3).
         NotOnGroupError: a matrix is not a rotation to 1e-5; nearer ones, as in single precision, are projected.
     """
-    matrix = np.asarray(R, dtype=float)
-    if matrix.shape[-2:] != (3, 3):
-        raise ShapeError(f"R has shape {matrix.shape}; its last axes must be (3, 3)")
+    matrix = shaped(R, (..., 3, 3), "R")
     places = quaternion_order(order)
     off = np.max(np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)), initial=0.0)
     if not (off <= NEAR_GROUP and np.all(np.linalg.det(matrix) > 0)):
@@ -180,7 +176,5 @@ def _permutation(library: str, group: MatrixGroup) -> list[int]:
 
 
 def _vectors(group: MatrixGroup, x: ArrayLike) -> Array:
-    vector = np.asarray(x, dtype=float)
-    if vector.ndim < 1 or vector.shape[-1] != group.dim:
-        raise ShapeError(f"x has shape {vector.shape}; its last axis must be {group.dim}")
+    vector = shaped(x, (..., group.dim), "x")
     return vector

@@ -15,6 +15,7 @@ from lie_codegen.kernel.runge_kutta import CLASSICAL, TUPLES, increment
 from lie_codegen.mechanics.mechanical_fields import MechanicalFields
 from lie_codegen.mechanics.polynomial_fields import Field
 from lie_codegen.mechanics.polynomial_kernels import evaluate
+from lie_codegen.shapes import shaped
 
 #: Steps of the unit-time flow of the frozen correction, a motion of size eps: its error is far below that of any order.
 _FLOW_STEPS = 8
@@ -51,9 +52,7 @@ class AveragingMap:
         Raises:
             InputError, ShapeError: naming what does not fit.
         """
-        velocity = np.asarray(xi, dtype=float)
-        if velocity.shape[-1:] != (self.fields.system.dim,):
-            raise ShapeError(f"xi has shape {velocity.shape}; its last axis must be {self.fields.system.dim}")
+        velocity = shaped(xi, (..., self.fields.system.dim), "xi")
         if X is not None:
             if advected:
                 raise InputError("give X or the advected vectors, not both")

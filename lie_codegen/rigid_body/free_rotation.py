@@ -19,6 +19,7 @@ from lie_codegen.rigid_body.inertia_matrix import SPHERE, principal_axes
 from lie_codegen.rigid_body.rotation_kernels import MOTION, NAMESPACE, free_rotation_kernels
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
+from lie_codegen.shapes import shaped
 
 _SEPARATRIX, _PURE, _ROTATION = 1e-9, 1e-8, 1e-5
 
@@ -215,9 +216,7 @@ def _fixed_axis(J: Array, moments: Array, omega: Array) -> NDArray[np.bool_]:
 
 
 def _rotation(X: ArrayLike) -> Array:
-    start = np.asarray(X, dtype=float)
-    if start.ndim < 2 or start.shape[-2:] != (3, 3):
-        raise ShapeError(f"X has shape {start.shape}, expected (..., 3, 3)")
+    start = shaped(X, (..., 3, 3), "X")
     finite = np.isfinite(start).all()
     defect = np.abs(np.swapaxes(start, -1, -2) @ start - np.eye(3)).max() if finite else np.inf
     if not defect <= _ROTATION or np.any(_determinant(start) < 0):

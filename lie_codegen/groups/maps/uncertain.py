@@ -19,6 +19,7 @@ from lie_codegen.groups.maps.covariance import compounded, flowed, transported
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.rows import row_by_row
+from lie_codegen.shapes import shaped
 from lie_codegen.values import settle
 
 _MOST_STEPS = 50
@@ -111,9 +112,7 @@ class Uncertain(Saved):
             ShapeError, NotFiniteError, InputError: about what does not fit; |ad_u| T beyond 1e12, of which rounding leaves nothing.
         """
         n = self.group.dim
-        velocity = np.asarray(u, dtype=float)
-        if velocity.shape != (n,):
-            raise ShapeError(f"Uncertain.flow: u has shape {velocity.shape}, ({n},) is needed")
+        velocity = shaped(u, (n,), "Uncertain.flow: u")
         if not np.all(np.isfinite(velocity)) or not np.isfinite(duration):
             raise NotFiniteError("Uncertain.flow: u or duration is NaN or infinite")
         if duration < 0:
