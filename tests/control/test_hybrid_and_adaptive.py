@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from kernel_calls import interpreted
+from package_program import run_example
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -216,8 +216,7 @@ def test_first_order_margins() -> None:
 
 def test_the_hybrid_law_flies_as_c_with_its_state_held(tmp_path: Path) -> None:
     """closed_loop.c: q is kept between calls, from a half turn home."""
-    compiler = shutil.which("cc")
-    if compiler is None:
+    if shutil.which("cc") is None:
         pytest.skip("no C compiler")
     reference = lc.reference("so3", ["0.3*sin(t/5)", "0.2*cos(t/5)", "0.1*t"])
     folder = generate_closed_loop(
@@ -230,23 +229,8 @@ def test_the_hybrid_law_flies_as_c_with_its_state_held(tmp_path: Path) -> None:
         duration=40,
         step=0.02,
     )
-    command = [
-        compiler,
-        "-std=c99",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-Iinclude",
-        "closed_loop.c",
-        "src/so3.c",
-        "-lm",
-        "-o",
-        "loop",
-    ]
-    subprocess.run(command, cwd=folder, check=True)
-    done = subprocess.run(["./loop"], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0
-    assert float(done.stdout.splitlines()[-1].split()[2]) < 1e-3
+    printed = run_example(folder, "so3", "closed_loop.c")
+    assert float(printed.splitlines()[-1].split()[2]) < 1e-3
 
 
 def test_the_loop_holds_states_of_every_kind() -> None:

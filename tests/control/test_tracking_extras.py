@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from kernel_calls import interpreted
+from package_program import run_example
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -174,21 +174,7 @@ def test_the_integral_law_in_the_compiled_loop_and_its_c(tmp_path: Path) -> None
     np.testing.assert_allclose(run.outputs["integral"][-1], end[12:], atol=1e-7)
 
     folder = lc.generate_closed_loop(so3, tmp_path / "loop", inertia=J, law=law, reference=still, X0=R0)
-    command = [
-        "cc",
-        "-std=c99",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-Iinclude",
-        "closed_loop.c",
-        "src/so3.c",
-        "-lm",
-        "-o",
-        "run",
-    ]
-    subprocess.run(command, cwd=folder, check=True)
-    subprocess.run([folder / "run"], cwd=folder, check=True, capture_output=True)
+    run_example(folder, "so3", "closed_loop.c")
 
 
 def test_laws_with_unknown_inputs_are_refused() -> None:

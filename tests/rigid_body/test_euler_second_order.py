@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import numpy as np
 import pytest
+from package_program import run_example
 from scipy.integrate import solve_ivp
 
 import lie_codegen as lc
@@ -157,12 +156,7 @@ def test_c_and_its_twin_and_the_package(flow, tmp_path):
     ):
         np.testing.assert_allclose(mine, theirs, rtol=1e-11, atol=1e-12)
     folder = lc.generate(list(kernels.values()), tmp_path / "out", name="euler_average")
-    subprocess.run(
-        ["cc", "-std=c99", "-Iinclude", "example.c", "src/euler_average.c", "-lm", "-o", "example"],
-        cwd=folder,
-        check=True,
-    )
-    subprocess.run(["./example"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    run_example(folder, "euler_average")
 
 
 def test_refusals(flow):

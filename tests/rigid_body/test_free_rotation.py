@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-
 import numpy as np
 import pytest
+from package_program import run_example
 from scipy.integrate import quad, solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -164,12 +163,7 @@ def test_c_its_twin_and_its_package(tmp_path):
     motion = evaluate(prepare, moments, axes, START, np.array([0.3, 0.2, 1]))
     np.testing.assert_allclose(evaluate(at, *motion[:-1], 50.0)[0], free.X(50.0), atol=1e-13)
     folder = lc.generate(list(free.kernels()), tmp_path / "out", name="free_rotation")
-    subprocess.run(
-        ["cc", "-std=c99", "-Iinclude", "example.c", "src/free_rotation.c", "-lm", "-o", "example"],
-        cwd=folder,
-        check=True,
-    )
-    subprocess.run(["./example"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    run_example(folder, "free_rotation")
 
 
 def test_a_rotation_is_a_value(tmp_path):

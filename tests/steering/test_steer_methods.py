@@ -186,30 +186,9 @@ def test_feedback_in_steps_converges(name: str) -> None:
 
 
 def test_feedback_under_noise_ends_within_a_few_standard_deviations() -> None:
-    drift = np.array([1e-4, 0, 0])
-    plan = lc.steer(
-        lc.group("so3"),
-        CASES["so3"][1],
-        (0, 1),
-        10.0,
-        method="feedback",
-        steps=10,
-        noise=1e-4,
-        disturbance=drift,
-        seed=3,
-    )
+    told = {"method": "feedback", "steps": 10, "noise": 1e-4, "disturbance": np.array([1e-4, 0, 0]), "seed": 3}
+    plan, again = (lc.steer("so3", CASES["so3"][1], (0, 1), 10.0, **told) for _ in range(2))
     assert 1e-6 < plan.error < 2e-3
-    again = lc.steer(
-        lc.group("so3"),
-        CASES["so3"][1],
-        (0, 1),
-        10.0,
-        method="feedback",
-        steps=10,
-        noise=1e-4,
-        disturbance=drift,
-        seed=3,
-    )
     assert again.error == plan.error
 
 
