@@ -78,7 +78,7 @@ def is_subinterpreter() -> bool:
 def _guarded(value: Any, name: str) -> Any:
     """The same value; a function is put behind the guard where it is defined too, of a class the constructor is."""
     if isinstance(value, types.FunctionType) and not hasattr(value, "__guarded__"):
-        guarded = _guard(value, name)
+        guarded = _without_masks(_guard(value, name), name)
         home = sys.modules[value.__module__].__dict__
         if home.get(name) is value:
             home[name] = guarded
@@ -86,8 +86,27 @@ def _guarded(value: Any, name: str) -> Any:
     if isinstance(value, type) and not issubclass(value, enum.Enum) and "__init__" in vars(value):
         constructor = vars(value)["__init__"]
         if isinstance(constructor, types.FunctionType) and not hasattr(constructor, "__guarded__"):
-            type.__setattr__(value, "__init__", _guard(constructor, name, bound=True))
+            guarded = _without_masks(_guard(constructor, name, bound=True), name)
+            type.__setattr__(value, "__init__", guarded)
     return value
+
+
+def has_masks(value: Any) -> bool:
+    """Whether it is an array of numpy.ma with masked entries: numpy drops the mask where numbers are asked for, and what lay below counts."""
+    return type(value).__name__ in ("MaskedArray", "MaskedConstant") and bool(value.mask.any())
+
+
+def _without_masks(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    @functools.wraps(function)
+    def checked(*args: Any, **named: Any) -> Any:
+        for value in (*args, *named.values()):
+            if has_masks(value):
+                raise ArgumentError(
+                    f"{name}: an array has masked entries, which are no numbers; fill them (.filled(...))"
+                )
+        return function(*args, **named)
+
+    return checked
 
 
 def guard_methods(kind: Class) -> Class:

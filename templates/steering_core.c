@@ -138,7 +138,7 @@ typedef struct {
 /* Sets one lane to the size r. */
 static void set_size(problem *task, int l, double r)
 {
-    const double least = pow(1e-11, 1.0 / DEPTH);
+    const double least = pow(1e-11, 1.0 / (double)DEPTH);
     double power[DEPTH + 1];
     int k;
     LANE(task->radius, l) = r;
@@ -204,7 +204,7 @@ static void damped_step(const V *H, const V *g, const V *lambda, int scaled, V *
     for (i = 1; i < N; ++i) {
         shift += H[i * N + i];
     }
-    shift = shift * ((scaled ? 1e-8 : 1.0) / N) * lambda[0] + 1e-300;
+    shift = shift * ((scaled ? 1e-8 : 1.0) / (double)N) * lambda[0] + 1e-300;
     for (i = 0; i < N; ++i) {
         for (j = 0; j <= i; ++j) {
             V sum = H[i * N + j];
@@ -555,7 +555,7 @@ static void logarithm(const V *target, V *x)
     int iteration, i, l, part, best = -1;
     /* Not from 0: half a turn has no first-order offset there. */
     for (i = 0; i < N; ++i) {
-        fill(x + i, 1, 0.05 * (1.0 + i) / N);
+        fill(x + i, 1, 0.05 * (1.0 + i) / (double)N);
         for (l = 1; l < LANES; ++l) {
             LANE(x[i], l) = 2.0 * uniform(&state);
         }
@@ -595,7 +595,7 @@ static void logarithm(const V *target, V *x)
     }
     offset(target, delta);
     for (i = 0; i < N; ++i) {
-        fill(x + i, 1, best >= 0 ? LANE(x[i], best) : LANE(delta[i], 0) + 0.5 * (1.0 + i) / N);
+        fill(x + i, 1, best >= 0 ? LANE(x[i], best) : LANE(delta[i], 0) + 0.5 * (1.0 + i) / (double)N);
     }
 }
 
@@ -687,7 +687,7 @@ static void costates_along(const problem *task, V (*u)[M], V (*column)[N][N])
     for (t = 0; t < 2 * SEED_STEPS; t += 2) {
         for (i = 0; i < M; ++i) {
             for (a = 0; a < 3; ++a) {
-                h[a][i] = (1.0 / SEED_STEPS) * u[t + a][i];
+                h[a][i] = (1.0 / (double)SEED_STEPS) * u[t + a][i];
             }
         }
         for (c = 0; c < N; ++c) {
@@ -703,7 +703,7 @@ static void normal_equations(const problem *task, V (*u)[M], V (*column)[N][N], 
     fill(H, N * N, 0.0);
     fill(g, N, 0.0);
     for (t = 0; t <= 2 * SEED_STEPS; t += 2) {
-        const double share = (t == 0 || t == 2 * SEED_STEPS ? 0.5 : 1.0) / SEED_STEPS;
+        const double share = (t == 0 || t == 2 * SEED_STEPS ? 0.5 : 1.0) / (double)SEED_STEPS;
         for (i = 0; i < M; ++i) {
             const V weight = share * task->inverse_weights[i], control = share * u[t][i];
             for (a = 0; a < N; ++a) {
@@ -738,7 +738,7 @@ static void path_along(V (*u)[M], V *X)
     for (t = 0; t < 2 * SEED_STEPS; t += 2) {
         for (i = 0; i < M; ++i) {
             for (a = 0; a < 3; ++a) {
-                h[a][i] = (1.0 / SEED_STEPS) * u[t + a][i];
+                h[a][i] = (1.0 / (double)SEED_STEPS) * u[t + a][i];
             }
         }
         path_step(h[0], h[1], h[2], X, X);
@@ -787,8 +787,8 @@ static void relax(const problem *task, int most, V (*u)[M], V *p)
                     sum += p[c] * column[t][c][control_of[i]];
                 }
                 change[t][i] = task->inverse_weights[i] * sum - u[t][i];
-                step += (0.5 / SEED_STEPS) * change[t][i] * change[t][i];
-                length += (0.5 / SEED_STEPS) * u[t][i] * u[t][i];
+                step += (0.5 / (double)SEED_STEPS) * change[t][i] * change[t][i];
+                length += (0.5 / (double)SEED_STEPS) * u[t][i] * u[t][i];
             }
         }
         open = 0;
@@ -1030,7 +1030,7 @@ static void solve_some(int count, const double *targets, const double *weights, 
     memset(&task, 0, sizeof task);
     task.space = space;
     for (i = 0; i < M; ++i) {
-        mean *= pow(weights[i], 1.0 / M);
+        mean *= pow(weights[i], 1.0 / (double)M);
         least = fmin(least, weights[i]);
         largest = fmax(largest, weights[i]);
     }

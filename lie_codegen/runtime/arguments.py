@@ -11,6 +11,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature
+from lie_codegen.door import has_masks
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.outputs import empty
@@ -60,7 +61,7 @@ def as_array(kernel: str, port: Port, value: Any, real: str = "double") -> Array
 
     Raises:
         ShapeError: not numbers, ragged, or complex where the port is real.
-        InputError: a number that is beyond the floats, where they are asked for.
+        InputError: masked entries; a number that is beyond the floats, where they are asked for.
     """
     wanted = dtype_of(port, real)
     if type(value) is np.ndarray and value.dtype is wanted and value.flags.c_contiguous and value.flags.aligned:
@@ -69,6 +70,8 @@ def as_array(kernel: str, port: Port, value: Any, real: str = "double") -> Array
         array = np.asarray(value)
     except ValueError as error:
         raise ShapeError(f"{kernel}: {port.name} is ragged: expected {describe(port)}") from error
+    if has_masks(value):
+        raise InputError(f"{kernel}: {port.name} has masked entries, which are no numbers; fill them (.filled(...))")
     if array.dtype.kind == "c" and not port.is_complex:
         raise ShapeError(f"{kernel}: {port.name} is real, {describe(port)}; complex numbers were given")
     if array.dtype.kind not in "biufc":

@@ -21,8 +21,8 @@ from lie_codegen.runtime.records import recalled
 from lie_codegen.steering.accessibility import with_drift
 
 #: Durations in seconds that double precision carries.
-_SHORTEST = 1e-100
-_LONGEST = 1e100
+SHORTEST = 1e-100
+LONGEST = 1e100
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ def check_duration(duration: object, where: str) -> None:
         SteeringInputError: it is no such number.
     """
     real = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
-    if not real or not _SHORTEST <= duration <= _LONGEST:  # type: ignore[operator]  # NaN fails the comparison
+    if not real or not SHORTEST <= duration <= LONGEST:  # type: ignore[operator]  # NaN fails the comparison
         raise SteeringInputError(
-            f"{where}: duration must be a positive number of seconds between {_SHORTEST:g} and {_LONGEST:g}, "
+            f"{where}: duration must be a positive number of seconds between {SHORTEST:g} and {LONGEST:g}, "
             f"got {shown(duration)}"
         )
 

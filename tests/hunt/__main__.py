@@ -15,13 +15,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.hunt import (
-    analysers,
     faults,
     fuzz,
     generated_c,
     growth,
     hostile,
     kills,
+    matrix,
     methods,
     off_manifold,
     resumed,
@@ -29,7 +29,6 @@ from tests.hunt import (
     solver_arguments,
     texts,
     torn,
-    warnings_matrix,
 )
 
 Part = Callable[[], tuple[int, list[str]]]
@@ -71,11 +70,8 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
     )
     found["calls of six kinds without growth of memory"] = lambda: growth.calls(1_000_000 * scale)
     found["planted and tampered files of the cache"] = lambda: faults.planted(home / "planted")
-    found["strict compilations: compilers, float, one lane, foreign targets"] = lambda: warnings_matrix.hunt(
+    found["cells of the matrix: packages by compilers, targets, sanitizers, analysers; plain C"] = lambda: matrix.hunt(
         home / "matrix"
-    )
-    found[f"packages under {', '.join(analysers.tools())} (with sanitizers)"] = lambda: analysers.hunt(
-        home / "analysed"
     )
     return found
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -117,3 +119,42 @@ def test_the_arguments_from_which_the_hunt_departs_are_answered(name: str) -> No
             function(**arguments)
     else:
         function(**arguments)
+
+
+MASKED = np.ma.masked_array([0.1, 0.2, 0.3], [True, False, False])
+
+
+def test_masked_entries_are_no_numbers() -> None:
+    """numpy drops the mask without a word: what lay below would be steered to."""
+    library = lc.build("so3")
+    for call in (
+        lambda: lc.steer("so3", MASKED, ("w1", "w2"), 2.0),
+        lambda: lc.simulate("so3", ["cos(t)", "0", "0"], t=MASKED),
+        lambda: lc.SampledInput([0.0, 1.0, 2.0], MASKED),
+        lambda: library.exp(MASKED),
+        lambda: library.exp.batch(np.ma.masked_array(np.ones((2, 3)), np.eye(2, 3))),
+    ):
+        with pytest.raises(lc.errors.InputError, match="masked entries"):
+            call()
+    whole = np.ma.masked_array([0.1, 0.2, 0.3], False)
+    np.testing.assert_array_equal(library.exp(whole), library.exp([0.1, 0.2, 0.3]))
+
+
+def test_costs_and_conditions_without_end_are_refused_at_once() -> None:
+    for option in ("cost", "constraints"):
+        began = time.process_time()
+        with pytest.raises(lc.errors.InputError, match="limit of terms is 1000"):
+            lc.steer("so3", [0.1, 0.2, 0.3], ("w1", "w2"), 2.0, **{option: itertools.repeat("w1")})
+        assert time.process_time() - began < 5.0
+
+
+def test_magnitudes_of_the_open_layer_are_those_of_steering() -> None:
+    def problem(duration: float) -> object:
+        return lc.ocp("so3", controls=("w1", "w2", "w3"), duration=duration, intervals=4, stage_cost=("u",))
+
+    for duration in (5e-324, 1e-200, 1e300, np.longdouble("1e400")):
+        with pytest.raises(lc.errors.InputError, match="between 1e-100 and 1e"):
+            problem(duration)
+    for option in ("penalty", "sample"):
+        with pytest.raises(lc.errors.InputError, match=option):
+            lc.mpc(problem(1.0), **{option: np.longdouble("1e400")})

@@ -21,6 +21,7 @@ from lie_codegen.steering.ocp.layout import Shape, check_distinct, layout
 from lie_codegen.steering.ocp.problem import OptimalControlProblem
 from lie_codegen.steering.ocp.problem_data import INTEGRATORS, QUADRATURES, ProblemData
 from lie_codegen.steering.ocp.written_terms import Terms, conditions_of, costs_of, sequence_of
+from lie_codegen.steering.task import LONGEST, SHORTEST
 
 
 @shows_progress
@@ -150,8 +151,11 @@ def _duration(duration: Any, where: str) -> tuple[float, tuple[float, float] | N
     """The duration of the equations, and the bounds of a free one."""
     ends = duration if isinstance(duration, tuple | list) and len(duration) == 2 else (duration,)
     for end in ends:
-        if isinstance(end, bool) or not isinstance(end, int | float | np.number) or not 0 < end < np.inf:
-            raise InputError(f"{where}: duration must be a positive number of seconds, or two, got {duration!r}")
+        if isinstance(end, bool) or not isinstance(end, int | float | np.number) or not SHORTEST <= end <= LONGEST:
+            raise InputError(
+                f"{where}: duration must be a positive number of seconds between {SHORTEST:g} and {LONGEST:g}, or two, "
+                f"got {duration!r}"
+            )
     if len(ends) == 1:
         return float(ends[0]), None
     if not ends[0] < ends[1]:

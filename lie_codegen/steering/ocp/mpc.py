@@ -38,7 +38,7 @@ def mpc(
         raise InputError(
             f"mpc({problem.data.name}): iterations must be a whole number from 1 to 1000, got {iterations!r}"
         )
-    if not (isinstance(penalty, int | float | np.number) and 0 < penalty < np.inf):
+    if not (isinstance(penalty, int | float | np.number) and penalty > 0 and float(penalty) < np.inf):
         raise InputError(f"mpc({problem.data.name}): penalty must be a positive number, got {penalty!r}")
     return ModelPredictiveControl(problem, int(iterations), float(penalty), _sample(problem.data, sample))
 
@@ -49,7 +49,7 @@ def _sample(data: ProblemData, sample: float | None) -> float:
     interval = (data.duration if data.free_duration is None else data.free_duration[0]) / data.intervals
     if sample is None:
         seconds = interval
-    elif not (isinstance(sample, int | float | np.number) and 0 < sample < np.inf):
+    elif not (isinstance(sample, int | float | np.number) and sample > 0 and float(sample) < np.inf):
         raise InputError(f"{where}: sample must be a positive number of seconds, got {sample!r}")
     elif data.free_duration is None and not np.isclose(sample, interval, rtol=1e-9):
         raise InputError(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from lie_codegen.errors import ExpressionError, InputError, ShapeError
+from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.steering.ocp.problem_data import Condition, Cost
 from lie_codegen.steering.ocp.terms import Term
@@ -20,13 +22,16 @@ def sequence_of(terms: Any) -> tuple[Any, ...]:
     """Terms as a tuple; numbers are texts too.
 
     Raises:
-        InputError: something that is neither a text, a number nor a Kernel.
+        InputError: something that is neither a text, a number nor a Kernel; more terms than the budget has.
     """
     if isinstance(terms, str | Kernel):
         return (terms,)
     if not isinstance(terms, Iterable) or isinstance(terms, Mapping):
         raise InputError(f"ocp: expected a text, a Kernel or a sequence of them, got {terms!r:.60}")
-    listed = tuple(repr(float(term)) if isinstance(term, int | float) else term for term in terms)
+    most = current_budget().terms
+    listed = tuple(repr(float(term)) if isinstance(term, int | float) else term for term in islice(terms, most + 1))
+    if len(listed) > most:
+        raise InputError(over("terms", f"ocp: more than {most} terms in one cost or set of conditions"))
     for term in listed:
         if not isinstance(term, str | Kernel):
             raise InputError(f"ocp: expected a text or a Kernel, got {term!r:.60}")
