@@ -112,6 +112,15 @@ def entry_files(home: Path) -> tuple[Path, Path]:
     return library, library.parent / "entry.json"
 
 
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache with one library, by a child: one that this process has open must not be overwritten in place."""
+    folder = tmp_path_factory.mktemp("built") / "the cache"
+    code = "import test_build as t\nt.build_kernels(lambda: [t.scaled(2)], namespace='toy', definition='two')\n"
+    run_python(code, LIE_CODEGEN_CACHE=str(folder))
+    return folder
+
+
 @pytest.mark.parametrize(
     "damage",
     [
@@ -142,10 +151,9 @@ def entry_files(home: Path) -> tuple[Path, Path]:
     ],
 )
 def test_a_damaged_entry_is_rebuilt_never_loaded(
-    damage: Callable[[Path, Path], object], home: Path, tmp_path: Path, compiles: list[str]
+    damage: Callable[[Path, Path], object], built: Path, home: Path, compiles: list[str]
 ) -> None:
-    # In a child, because a library that this process has open must not be overwritten in place.
-    run_python("import test_build as t\nt.build_kernels(lambda: [t.scaled(2)], namespace='toy', definition='two')\n")
+    shutil.copytree(built, home)
     damage(*entry_files(home))
     library = build_kernels(lambda: [scaled(2)], namespace="toy", definition="two")
     assert library.scale(4.0) == 8.0
