@@ -86,15 +86,16 @@ def test_a_limit_cycle_known_in_closed_form():
     second = lc.floquet(two, guess=first.start, parameters={"eps": eps})
 
     def rate(_, y):
-        terms = two.terms(y)
-        return eps * terms.F1 + eps**2 * terms.F2
+        terms = two.terms(y.reshape(-1, 2))
+        return (eps * terms.F1 + eps**2 * terms.F2).ravel()
 
-    def after(y):
-        return solve_ivp(rate, (0, second.period), y, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-
-    np.testing.assert_allclose(after(second.start), second.start, atol=1e-9)
-    moved = np.array([after(second.start + h) - after(second.start - h) for h in 1e-4 * np.eye(2)]).T / 2e-4
-    np.testing.assert_allclose(second.monodromy, moved, atol=1e-5)
+    h = 1e-4 * np.eye(2)
+    starts = second.start + np.array([[0, 0], *h, *-h])
+    run = solve_ivp(rate, (0, second.period), starts.ravel(), method="DOP853", rtol=1e-11, atol=1e-13)
+    end, *moved = run.y[:, -1].reshape(-1, 2)
+    np.testing.assert_allclose(end, second.start, atol=1e-9)
+    slopes = (np.array(moved[:2]) - moved[2:]).T / 2e-4
+    np.testing.assert_allclose(second.monodromy, slopes, atol=1e-5)
     assert abs(second.period - first.period) > 0.01
 
 
