@@ -13,36 +13,7 @@
 #define HALVES 1 /* of skew-Hermitian matrices what lies above the diagonal is enough here */
 #include "magnus_words.h"
 
-/* One step of every lane; keeps the largest squared |a_1|. */
-static __attribute__((noinline)) void step(const Input *u, Source *source, int order, V middle, V low, V h, const double *const *table,
-    V *state, V *most)
-{
-    V a[ORDERS][DIM], omega[WORK], norm = splat(0.0);
-    generators(u, source, middle, low, h, table, a);
-#if COORDINATES
-#define IN_WORK a
-#else
-    V work[ORDERS][MATRIX];
-    EACH(j, ORDERS) { hat_work(a[j], work[j]); }
-#if ABOVE
-    EACH(j, 2) { /* brackets read these two */
-        EACH_ABOVE(k) { SET_SKEW(work[j], work[j][k]); }
-    }
-#endif
-#define IN_WORK work
-#endif
-    if (order == 8) {
-        Stages stages;
-        exponent8((const V (*)[WORK])IN_WORK, &stages, omega);
-    } else if (order == 6) {
-        exponent6((const V (*)[WORK])IN_WORK, omega);
-    } else {
-        exponent4((const V (*)[WORK])IN_WORK, omega);
-    }
-    EACH(i, DIM) { norm += a[0][i] * a[0][i]; }
-    *most = (V)(((norm > *most) & (I)norm) | (~(norm > *most) & (I)*most)) + 0.0 * norm;
-    move(omega, state);
-}
+#include "magnus_step.h"
 
 /* The middle of step `inside` of a span, to twice the precision. */
 static inline V middle_of(V knot, V inside, V h, V *low)

@@ -2,33 +2,9 @@
 #ifndef MAGNUS_INPUT_H
 #define MAGNUS_INPUT_H
 
-/* Strides in doubles from one trajectory to the next; 0 where all share. */
-typedef struct {
-    ptrdiff_t rates, wave_stride, rate_stride;
-    const double *rate, *rate_low;         /* w_f and what rounding left of it */
-    const double *cosines, *sines;         /* rates x DIM */
-    const double *times;                   /* ends of the pieces; NULL without */
-    const double *left, *right;            /* pieces x DIM: at the start and the end of each, straight between */
-    ptrdiff_t line_stride;
-    ptrdiff_t terms;                       /* of Legendre series instead, on [-1, 1] of each piece; 0 without */
-    const double *series;                  /* pieces x terms x DIM */
-    ptrdiff_t nodes, table_stride;
-    const double *table;                   /* steps x nodes x DIM: values at the nodes of every step; NULL without */
-    const double *projection;              /* ORDERS x nodes: from values at nodes to generators, over h */
-    ptrdiff_t tangents, tangent_stride;
-    const double *tangent;                 /* steps x nodes x tangents x DIM: derivatives of the values */
-    const double *factor;                  /* of u */
-    ptrdiff_t factor_stride;
-} Input;
+#include "magnus_given.h"
 
-/* Spans between knots, parts[s] equal steps each; `first` are their running sums. */
-typedef struct {
-    ptrdiff_t spans;
-    const double *knots;
-    const ptrdiff_t *parts, *first, *piece, *slot; /* piece of the input; where the state at the end goes, or -1 */
-} Grid;
-
-/* What eight lanes know of u; `waves` and `lines` lie in the workspace. */
+/* What the lanes know of u; `waves` and `lines` lie in the workspace. */
 typedef struct {
     V *cosines, *sines; /* rates x DIM */
     V *rate, *rate_low;
@@ -37,27 +13,9 @@ typedef struct {
     ptrdiff_t age;      /* steps since the angles were taken afresh; negative: they have to be */
     V *left, *slope;    /* DIM each */
     V *series;          /* terms x DIM */
-    V start, width, factor;
+    V start, start_low, width, factor; /* of the piece, its start to twice the precision */
     double h[LANES], turned[LANES]; /* of the weights, of `turn` */
 } Source;
-
-/* cos and sin of p + e, e small: p less the nearest multiple of pi/2, in three pieces, then Taylor to 1e-18. */
-static inline void cos_sin(V p, V e, V *c, V *s)
-{
-    const double magic = 6755399441055744.0;
-    const V n = (p * 0.6366197723675814 + magic) - magic;
-    const I k = (I)(n + magic);
-    const V r = (fused(-n, splat(6.123233995736766e-17), fused(-n, splat(1.5707963267948966), p))
-        - n * -1.4973849048591833e-33) + e;
-    const V z = r * r;
-    const V sine = r + r * z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800
-        + z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0 + z * (1.0 / 355687428096000.0))))))));
-    const V cosine = 1.0 + z * (-0.5 + z * (1.0 / 24 + z * (-1.0 / 720 + z * (1.0 / 40320 + z * (-1.0 / 3628800
-        + z * (1.0 / 479001600 + z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0))))))));
-    const I odd = -(k & 1), minus_sine = (k & 2) << 62, minus_cosine = ((k + 1) & 2) << 62;
-    *s = (V)(((odd & (I)cosine) | (~odd & (I)sine)) ^ minus_sine);
-    *c = (V)(((odd & (I)sine) | (~odd & (I)cosine)) ^ minus_cosine);
-}
 
 /* The halves of a Gauss-Legendre rule of 12 points on [-1/2, 1/2]. */
 static const double gauss_node[6] = {0.06261670425573440, 0.18391574949909010, 0.29365897714330870, 0.38495133709715234,
@@ -124,13 +82,14 @@ static void enter(const Input *u, const Grid *grid, Source *source, int lane, pt
         const ptrdiff_t k = grid->piece[span];
         const double width = u->times[k + 1] - u->times[k];
         source->start[lane] = u->times[k];
+        source->start_low[lane] = u->times[k] - source->start[lane]; /* what lanes of floats round off */
         source->width[lane] = width;
         if (u->terms) {
             for (ptrdiff_t i = 0; i < u->terms * DIM; ++i) {
                 source->series[i][lane] = u->series[k * u->terms * DIM + i];
             }
         } else {
-            const double *left = u->left + who * u->line_stride + k * DIM, *right = u->right + who * u->line_stride + k * DIM;
+            const Given *left = u->left + who * u->line_stride + k * DIM, *right = u->right + who * u->line_stride + k * DIM;
             EACH(i, DIM) {
                 source->left[i][lane] = left[i];
                 source->slope[i][lane] = right[i] - left[i];
@@ -139,6 +98,7 @@ static void enter(const Input *u, const Grid *grid, Source *source, int lane, pt
     }
 }
 
+#if TABLES
 /* Tables of values at the nodes: the generators of eight steps, `table` pointing at each lane's own, `apart` from node to node. */
 static __attribute__((noinline)) void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V a[ORDERS][DIM])
 {
@@ -151,6 +111,7 @@ static __attribute__((noinline)) void from_nodes(const Input *u, const double *c
         }
     }
 }
+#endif
 
 /* Gauss-Legendre of 5 points on [-1/2, 1/2]: exact for the first two generators of a piece of degree 8. */
 static const double five_node[5] = {0.0, 0.26923465505284155, -0.26923465505284155, 0.45308992296933200, -0.45308992296933200};
@@ -160,7 +121,7 @@ static const double five_weight[5] = {0.28444444444444444, 0.23931433524968324, 
 /* The generators of a Legendre series: those of each polynomial from its values at five nodes, times its coefficients. */
 static __attribute__((noinline)) void from_series(const Input *u, const Source *source, V middle, V low, V h, V a[ORDERS][DIM])
 {
-    const V centre = 2.0 * (((middle - source->start) + low) / source->width) - 1.0, reach = 2.0 * h / source->width;
+    const V centre = 2.0 * (((middle - source->start) + (low - source->start_low)) / source->width) - 1.0, reach = 2.0 * h / source->width;
     V before[5], now[5], x[5];
     EACH(g, 5) {
         x[g] = centre + five_node[g] * reach;
@@ -197,8 +158,8 @@ static inline void generators(const Input *u, Source *source, V middle, V low, V
     EACH(j, ORDERS) {
         EACH(i, DIM) { a[j][i] = splat(0.0); }
     }
-    /* Angles turn by w h from step to step; what rounding adds is thrown away every 64 steps. */
-    source->age = source->age >= 0 && source->age < 64 ? source->age + 1 : 0;
+    /* Angles turn by w h from step to step; what rounding adds is thrown away every AFRESH steps. */
+    source->age = source->age >= 0 && source->age < AFRESH ? source->age + 1 : 0;
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
         const V *k = source->weights + f * ORDERS;
         V c = source->angle[2 * f], s = source->angle[2 * f + 1];
@@ -224,15 +185,19 @@ static inline void generators(const Input *u, Source *source, V middle, V low, V
     if (u->terms) {
         from_series(u, source, middle, low, h, a);
     } else if (u->times) {
-        const V x = ((middle - source->start) + low) / source->width, part = h / source->width;
+        const V x = ((middle - source->start) + (low - source->start_low)) / source->width, part = h / source->width;
         EACH(i, DIM) {
             a[0][i] += h * (source->left[i] + x * source->slope[i]);
             a[1][i] += h * part * source->slope[i];
         }
     }
+#if TABLES
     if (u->table) {
         from_nodes(u, table, DIM, h, a);
     }
+#else
+    (void)table;
+#endif
     EACH(j, ORDERS) {
         EACH(i, DIM) { a[j][i] *= source->factor; }
     }

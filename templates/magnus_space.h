@@ -21,7 +21,7 @@ static void lay_out(const Input *u, V *space, Source *source)
     source->slope = source->left + DIM;
     source->series = source->slope + DIM;
     EACH(l, LANES) { source->h[l] = -1.0; }
-    source->start = splat(0.0);
+    source->start = source->start_low = splat(0.0);
     source->width = splat(1.0);
     source->factor = splat(1.0);
     EACH(i, DIM) { source->left[i] = source->slope[i] = splat(0.0); }
@@ -44,7 +44,7 @@ static void set_waves(const Input *u, Source *source, int lane, ptrdiff_t who)
     }
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
         source->rate[f][lane] = u->rate[who * u->rate_stride + f];
-        source->rate_low[f][lane] = u->rate_low[who * u->rate_stride + f];
+        source->rate_low[f][lane] = (u->rate[who * u->rate_stride + f] - source->rate[f][lane]) + u->rate_low[who * u->rate_stride + f];
     }
     source->h[lane] = -1.0;
     source->factor[lane] = u->factor[who * u->factor_stride];

@@ -14,12 +14,21 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.input_slopes import dual_basis, slopes_along
 from lie_codegen.flow.inputs import as_drive, as_signal
 from lie_codegen.flow.magnus.drive import Drive
-from lie_codegen.flow.magnus.run import BLOCK, MOST_STEPS, MagnusRun, as_run, magnus_run, order_for, solver_of
+from lie_codegen.flow.magnus.run import (
+    BLOCK,
+    MOST_STEPS,
+    SINGLE_GOAL,
+    MagnusRun,
+    as_run,
+    magnus_run,
+    order_for,
+    solver_of,
+)
 from lie_codegen.flow.magnus.solver import LONG, REACHED, WaveRuns
 from lie_codegen.flow.magnus.tangents import tangents
 from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive, wave_numbers
 from lie_codegen.flow.propagation import Power, PropagationBatch, power_of
-from lie_codegen.flow.simulate_arguments import check_tolerance
+from lie_codegen.flow.simulate_arguments import check_precision, check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
@@ -185,11 +194,12 @@ class Propagator(Saved):
         finest = max(run.steps, int(np.ceil(length / run.shortest * (1 - 1e-9))))
         return Propagation(run.X[0], run.error_estimate, run.steps, length, named, self, finest)
 
-    def batch(self, *, threads: int = 1, **parameters: ArrayLike) -> PropagationBatch:
+    def batch(self, *, threads: int = 1, precision: str = "double", **parameters: ArrayLike) -> PropagationBatch:
         """X(T; p) where any of the parameters are (N,) arrays and the others numbers, eight at a time on lanes.
 
         Args:
             threads: that share the members; the result does not depend on it.
+            precision: "single" for screening, to 1e-6 at best, as in `simulate`.
             parameters: each by its name, a number or (N,).
 
         Raises:
@@ -197,6 +207,7 @@ class Propagator(Saved):
             ShapeError: arrays of different lengths.
         """
         where = f"propagator({self.group.name})"
+        single = check_precision(where, precision)
         if not isinstance(self.u, ParametricInput):
             raise InputError(f"{where}: the input has no parameters; give a lc.ParametricInput")
         values = self.u.values(parameters, many=True)
@@ -214,7 +225,7 @@ class Propagator(Saved):
         else:
             length = float(self.duration)
         drives = parametric_batch(self.u, values, count, length, self.rtol, self.resolution, where)
-        runs = [self._run(drive, length, self._one, threads) for drive in drives]
+        runs = [self._run(drive, length, self._one, threads, single) for drive in drives]
         X = np.concatenate([run.X[0] if run.X.ndim == 4 else run.X for run in runs])
         return PropagationBatch(X, max(run.error_estimate for run in runs), max(run.steps for run in runs))
 
@@ -256,9 +267,10 @@ class Propagator(Saved):
     def _fixed_length(self) -> float:
         return float(self.u.T) if self.duration == "period" else float(self.duration)
 
-    def _run(self, drive: Drive, length: float, start: Array, threads: int = 1) -> MagnusRun:
+    def _run(self, drive: Drive, length: float, start: Array, threads: int = 1, single: bool = False) -> MagnusRun:
         times = np.array([0.0, length])
-        return magnus_run(self.group, drive, times, start, order=self._order, rtol=self.rtol, threads=threads)
+        rtol, order = (max(self.rtol, SINGLE_GOAL), 8) if single else (self.rtol, self._order)
+        return magnus_run(self.group, drive, times, start, order=order, rtol=rtol, threads=threads, single=single)
 
 
 def propagator(

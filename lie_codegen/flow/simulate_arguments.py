@@ -13,7 +13,7 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.events import Event, event_function
 from lie_codegen.flow.events import Function as EventFunction
 from lie_codegen.flow.inputs import Signal
-from lie_codegen.flow.magnus.run import MOST_STEPS
+from lie_codegen.flow.magnus.run import MOST_STEPS, ORDERS, SINGLE_GOAL
 from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup
 
@@ -39,6 +39,33 @@ def event_functions(
     if events and many:
         raise InputError(f"simulate({group.name}): events are of one trajectory; simulate it alone")
     return tuple(event_function(event, group.degree, group.is_complex) for event in events)
+
+
+def check_precision(where: str, precision: Any) -> bool:
+    """Whether it is "single".
+
+    Raises:
+        InputError: it is neither that nor "double".
+    """
+    if precision not in ("double", "single"):
+        raise InputError(f'{where}: precision is "double" or "single", given {precision!r}')
+    return bool(precision == "single")
+
+
+def check_single(group: MatrixGroup, method: str, rtol: float | None, signal: Signal, eps: Array, start: Array) -> None:
+    """Single precision is for N trajectories, by Magnus steps, to 1e-6 at best.
+
+    Raises:
+        InputError: something else is asked for.
+    """
+    where = f"simulate({group.name})"
+    many = start.ndim == 3 or eps.ndim or (signal.formula is not None and signal.formula.trajectories is not None)
+    if not many:
+        raise InputError(f'{where}: precision="single" is for N trajectories: give eps, X0 or u of N')
+    if method != "auto" and method not in ORDERS:
+        raise InputError(f'{where}: precision="single" goes with the Magnus methods, not with {method}')
+    if rtol is not None and rtol < SINGLE_GOAL:
+        raise InputError(f'{where}: precision="single" reaches {SINGLE_GOAL:g} at best, given {rtol:g}')
 
 
 def check_tolerance(where: str, rtol: float | None, atol: float, tolerance: float | None) -> float:

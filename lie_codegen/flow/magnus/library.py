@@ -17,8 +17,11 @@ from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
 
 #: Plain C, beside the header that is made for the group.
-_HEADERS = tuple(f"magnus_{name}.h" for name in ("words", "lanes", "input", "exponent", "move", "space"))
-_LANES = 8
+_HEADERS = tuple(f"magnus_{name}.h" for name in ("words", "lanes", "given", "input", "exponent", "move", "space"))
+_MORE = {"magnus": ("magnus_step.h", "magnus_solve.h"), "magnus_single": ("magnus_step.h",)}
+#: What Python gives stays in doubles where the lanes hold floats; the rest is written in floats.
+_IN_DOUBLES = ("magnus_single.c", "magnus_given.h", "magnus_lanes.h")
+_LANES, _SINGLE_LANES = 8, 16
 #: Up to this dimension loops over coordinates are worth unrolling (a third faster); beyond, it only takes longer to compile.
 _SMALL = 8
 
@@ -83,6 +86,17 @@ class MagnusLibrary:
         return library
 
     @cached_property
+    def _single(self) -> ctypes.CDLL:
+        size, pointer = ctypes.c_ssize_t, ctypes.c_void_p
+        library = _opened(self.group, "magnus_single")
+        if library is None:
+            raise CompileError(f"{self.group.name}: its Magnus steps do not compile in single precision")
+        library.magnus_single_work.restype, library.magnus_single_work.argtypes = size, (size, size)
+        library.magnus_many_single.restype = None
+        library.magnus_many_single.argtypes = (pointer, pointer, size, size, pointer, size, size, pointer, pointer)
+        return library
+
+    @cached_property
     def _reverse(self) -> ctypes.CDLL:
         size, pointer = ctypes.c_ssize_t, ctypes.c_void_p
         library = _opened(self.group, "magnus_pullback")
@@ -131,6 +145,19 @@ class MagnusLibrary:
         space = np.empty(self.work(drive.rates.shape[-1], drive.terms, 0))
         self._many(
             ctypes.addressof(u), ctypes.addressof(grid), order, last - first, X0.ctypes.data + 8 * stride * first, stride,
+            steps.slots, space.ctypes.data, X.ctypes.data,
+        )  # fmt: skip
+        return X
+
+    def many_single(self, drive: Drive, steps: Steps, order: int, X0: Array, first: int, last: int) -> Array:
+        """As `many`, sixteen at a time in single precision; X0 and the result are float32 or complex64."""
+        u, grid = read_by(drive, first), grid_of(steps)
+        stride = X0[0].nbytes // 4 if X0.ndim == 3 else 0
+        X = np.zeros((last - first, steps.slots, *X0.shape[-2:]), X0.dtype)
+        floats = int(self._single.magnus_single_work(drive.rates.shape[-1], drive.terms)) + _SINGLE_LANES
+        space = np.empty(floats, np.float32)
+        self._single.magnus_many_single(
+            ctypes.addressof(u), ctypes.addressof(grid), order, last - first, X0.ctypes.data + 4 * stride * first, stride,
             steps.slots, space.ctypes.data, X.ctypes.data,
         )  # fmt: skip
         return X
@@ -206,13 +233,20 @@ def _opened(group: MatrixGroup, stem: str) -> ctypes.CDLL | None:
     """A C file with the headers of the Magnus steps and the one made for the group, compiled."""
 
     def files() -> dict[str, str]:
+        from lie_codegen.codegen.opcodes import in_single
         from lie_codegen.codegen.templates import render
         from lie_codegen.flow.magnus.group_view import group_view, whole_matrix_view
 
         view = (whole_matrix_view if stem == "magnus_pullback" else group_view)(group)
-        names = (f"{stem}.c", *_HEADERS, *(("magnus_solve.h",) if stem == "magnus" else ()))
-        plain = {name: (template_folder() / name).read_text(encoding="utf-8") for name in names}
-        return {**plain, "magnus_group.h": render("magnus_group.h.jinja", group=view)}
+        names = (f"{stem}.c", *_HEADERS, *_MORE.get(stem, ()))
+        source = {name: name for name in names}
+        if stem == "magnus_single":
+            source["magnus_lanes.h"] = "magnus_lanes_single.h"
+        texts = {name: (template_folder() / file).read_text(encoding="utf-8") for name, file in source.items()}
+        texts["magnus_group.h"] = render("magnus_group.h.jinja", group=view)
+        if stem == "magnus_single":
+            return {name: text if name in _IN_DOUBLES else in_single(text) for name, text in texts.items()}
+        return texts
 
     try:
         path = build_source(

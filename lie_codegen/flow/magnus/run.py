@@ -24,6 +24,8 @@ MOST_STEPS = 2**26
 BLOCK = 2_000_000
 #: Steps of one trajectory, and trajectories, below which another thread costs more than it brings.
 _LEAST_STEPS, _LEAST_TRAJECTORIES = 4096, 32
+#: What single precision is asked for at best, and what one rounding costs there.
+SINGLE_GOAL, _SINGLE_ROUNDING = 1e-6, 2.0**-24
 #: The steps are never made more than so many times shorter at once: far from convergence the estimate says little.
 _LARGEST_LEAP = 8
 _TOO_FAST = (
@@ -73,10 +75,12 @@ def magnus_run(
     atol: float = 0.0,
     most: int = MOST_STEPS,
     threads: int = 1,
+    single: bool = False,
 ) -> MagnusRun:
     """Steps are made shorter until two runs agree: the error of the finer is their difference over (ratio^order - 1).
 
     Of the first pair the order is trusted less, 63 is taken for 255: far from convergence the error falls more slowly.
+    `single`: many trajectories in single precision.
 
     Raises:
         ComputationError: the tolerance is not met with `most` steps, or the solution is not finite.
@@ -84,7 +88,7 @@ def magnus_run(
     where = f"simulate({group.name})"
     solver = solver_of(group) if threads == 1 and X0.ndim == 2 and drive.many is None else None
     if solver is None:
-        return _led_by_python(group, drive, times, X0, order, rtol, atol, most, threads, where)
+        return _led_by_python(group, drive, times, X0, order, rtol, atol, most, threads, where, single)
     found = solver(drive, times, X0, order=order, rtol=rtol, atol=atol, most=most, block=BLOCK)
     if found.status == LONG:
         return _led_by_python(group, drive, times, X0, order, rtol, atol, most, threads, where)
@@ -119,35 +123,49 @@ def _led_by_python(
     most: int,
     threads: int,
     where: str,
+    single: bool = False,
 ) -> MagnusRun:
     """The same loop as magnus_solve.h: for many trajectories, several threads, runs of millions of steps, and without a compiler."""
     base = plan_steps(drive, norms_of(group), times, most)
     if base is None:
         raise ComputationError(_TOO_FAST.format(where=where, most=most))
-    before, coarse = 1, _finite(flow(group, drive, base, order, X0, threads), where)
+    before, coarse = 1, _finite(flow(group, drive, base, order, X0, threads, single), where)
     multiple, trust = 2, order - 2
     while True:
         if base.count * multiple > most:
             raise ComputationError(_NOT_REACHED.format(where=where, most=most, done=base.count * before))
         steps = base.times(multiple)
-        fine = _finite(flow(group, drive, steps, order, X0, threads), where)
+        fine = _finite(flow(group, drive, steps, order, X0, threads, single), where)
         scale = max(1.0, float(np.max(np.abs(fine))))
         difference = float(np.max(np.abs(fine - coarse), initial=0.0))
         estimate = difference / ((multiple / before) ** trust - 1)
         goal = max(rtol * scale, atol)
-        floor = 4e-16 * scale * np.sqrt(steps.count)
+        floor = scale * (_single_floor(group, drive, steps) if single else 4e-16 * np.sqrt(steps.count))
         if estimate <= max(goal, floor):
-            return MagnusRun(
-                fine, order, multiple, steps.count, steps.longest, steps.shortest, estimate + drive.error * scale
-            )
+            known = (max(estimate, floor) if single else estimate) + drive.error * scale
+            return MagnusRun(fine, order, multiple, steps.count, steps.longest, steps.shortest, known)
         # The next run should reach half the goal; it is at least half as fine again, so that the two can be compared.
         needed = (estimate / max(goal / 2, floor)) ** (1 / order)
         before, coarse, trust = multiple, fine, order
         multiple = int(np.ceil(multiple * min(max(needed, 1.5), _LARGEST_LEAP)))
 
 
+def _single_floor(group: MatrixGroup, drive: Drive, steps: Steps) -> float:
+    """What single precision rounds: u, in proportion to its integral, and every step, one way or the other."""
+    integral = float(np.sum(np.diff(steps.knots) * drive.density(norms_of(group), steps.piece)))
+    return float(_SINGLE_ROUNDING * (integral + 4 * np.sqrt(steps.count)))
+
+
 def fixed_run(
-    group: MatrixGroup, drive: Drive, times: Array, X0: Array, *, order: int, steps: int, threads: int = 1
+    group: MatrixGroup,
+    drive: Drive,
+    times: Array,
+    X0: Array,
+    *,
+    order: int,
+    steps: int,
+    threads: int = 1,
+    single: bool = False,
 ) -> MagnusRun:
     """So many equal steps between the first and the last time, or the next more that end at every time and jump of u."""
     wanted = steps / (times[-1] - times[0]) * (1 - 1e-12)
@@ -168,7 +186,7 @@ def fixed_run(
         raise ComputationError(f"simulate({group.name}): u is not finite")
     parts = np.ones_like(planned.parts) if drive.terms else np.maximum(np.ceil(np.diff(planned.knots) * wanted), 1)
     chosen = Steps(planned.knots, parts.astype(np.intp), planned.piece, planned.slot, planned.slots)
-    X = _finite(flow(group, drive, chosen, order, X0, threads), f"simulate({group.name})")
+    X = _finite(flow(group, drive, chosen, order, X0, threads, single), f"simulate({group.name})")
     return MagnusRun(X, order, 0, chosen.count, chosen.longest, chosen.shortest, float("nan"))
 
 
@@ -179,8 +197,13 @@ def solver_of(group: MatrixGroup) -> Solver | None:
     return None if library is None else Solver(library, norms_of(group))
 
 
-def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, threads: int = 1) -> Array:
-    """X at the slots by one pass over the steps: (slots, d, d), or (slots, N, d, d) where u, its factor or X0 has N."""
+def flow(
+    group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, threads: int = 1, single: bool = False
+) -> Array:
+    """X at the slots by one pass over the steps: (slots, d, d), or (slots, N, d, d) where u, its factor or X0 has N.
+
+    `single`: N trajectories in single precision, where there is a compiler.
+    """
     library = magnus_library(group)
     many = len(X0) if X0.ndim == 3 else drive.many
     if library is None:
@@ -188,10 +211,12 @@ def flow(group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, 
 
         return numpy_steps.flow(group, drive, steps, order, X0)
     if many is not None:
+        move = library.many_single if single else library.many
+        start = X0.astype(np.complex64 if X0.dtype.kind == "c" else np.float32) if single else X0
         parts = share_out(
-            lambda a, b: library.many(drive, steps, order, X0, a, b), many, threads, _LEAST_TRAJECTORIES, steps.count
+            lambda a, b: move(drive, steps, order, start, a, b), many, threads, _LEAST_TRAJECTORIES, steps.count
         )
-        return np.ascontiguousarray(np.moveaxis(np.concatenate(parts), 0, 1))
+        return np.ascontiguousarray(np.moveaxis(np.concatenate(parts), 0, 1), dtype=X0.dtype)
     if threads == 1:
         return _in_blocks(library, drive, steps, order, X0)
     return _over_time(library, drive, steps, order, X0, threads)
