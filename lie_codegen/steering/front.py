@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Never
+from typing import Any, NamedTuple, Never
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -191,45 +191,42 @@ def steer(
         raise SteeringInputError(unknown_keywords(f"steer({group.name})", unknown, known))
     options = {name: value for name, value in given.items() if name not in _TASK and value is not None}
     check_options(f"steer({group.name})", method, options)
-    plan = _found(group, target, controls, duration, method, tolerance, options)
+    plan = _found(_Asked(group, target, controls, duration, method, tolerance, options))
     if isinstance(target, GoalSet) or np.shape(target) != (group.degree, group.degree):
         return plan
     distance = admitted_element(group, target, f"steer({group.name}): target").projected
     return replace(plan, projected=distance) if distance else plan
 
 
-def _found(
-    group: MatrixGroup,
-    target: Any,
-    controls: Sequence[Any],
-    duration: float,
-    method: str,
-    tolerance: float,
-    options: dict[str, Any],
-) -> Plan:
+class _Asked(NamedTuple):
+    """What `steer` was asked for, read."""
+
+    group: MatrixGroup
+    target: Any
+    controls: Sequence[Any]
+    duration: float
+    method: str
+    tolerance: float
+    options: dict[str, Any]
+
+
+def _found(asked: _Asked) -> Plan:
     """The plan; among obstacles where the transcription finds none, that of the direct method."""
-    given = (group, target, controls, duration)
     try:
-        return _planned(*given, method, tolerance, options)
+        return _planned(asked)
     except SteeringError as error:
-        asked = asks_direct(method, target, controls, options)
-        if asked or isinstance(error, InfeasibleError) or not goes_around(method, controls, options):
+        directly = asks_direct(asked.method, asked.target, asked.controls, asked.options)
+        around = goes_around(asked.method, asked.controls, asked.options)
+        if directly or isinstance(error, InfeasibleError) or not around:
             raise
         try:
-            return _planned(*given, "direct", tolerance, options)
+            return _planned(asked._replace(method="direct"))
         except SteeringError:
             raise error from None
 
 
-def _planned(
-    group: MatrixGroup,
-    target: Any,
-    controls: Sequence[Any],
-    duration: float,
-    method: str,
-    tolerance: float,
-    options: dict[str, Any],
-) -> Plan:
+def _planned(asked: _Asked) -> Plan:
+    group, target, controls, duration, method, tolerance, options = asked
     # what one method alone needs is imported with it: half of the time of a first plan
     if asks_open(method, options):
         from lie_codegen.steering.ocp.steered import open_plan
@@ -246,7 +243,9 @@ def _planned(
 
         return symmetric_product_plan(group, target, controls, duration, tolerance, options)
     if options.get("start") is not None:
-        return _from(group, target, controls, duration, method, tolerance, options)
+        # planned from the identity, and placed where it begins
+        start, element, moved = seen_from(group, options["start"], target, options)
+        return placed(steer(group, element, controls, duration, method, tolerance=tolerance, **moved), start)
     methods = dict(OPEN_LOOP)
     if method not in methods and method != "auto":
         from lie_codegen.steering.feedback import feedback
@@ -255,17 +254,3 @@ def _planned(
     torques = options.get("dynamics") == "second_order"
     task = make_task(group, target, controls, duration, tolerance, torques=torques, drift=options.get("drift"))
     return plan_by(methods, method, task, options)
-
-
-def _from(
-    group: MatrixGroup,
-    target: Any,
-    controls: Sequence[Any],
-    duration: float,
-    method: str,
-    tolerance: float,
-    options: dict[str, Any],
-) -> Plan:
-    """The plan of a method that begins at the identity, from another start."""
-    start, element, moved = seen_from(group, options["start"], target, options)
-    return placed(steer(group, element, controls, duration, method, tolerance=tolerance, **moved), start)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError
-from lie_codegen.steering.direct.arc_descent import sharpened, tidied, with_other_arcs, words_programme
+from lie_codegen.steering.direct.arc_descent import Candidate, WordDescent
 from lie_codegen.steering.direct.arc_words import (
     letters_of,
     long_words,
@@ -30,7 +30,7 @@ from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.magnus_flow import end_reached
 from lie_codegen.steering.direct.polish import Flown
-from lie_codegen.steering.direct.programme import Machine, Settings, chosen
+from lie_codegen.steering.direct.programme import Settings, chosen
 from lie_codegen.steering.direct.report import error_at, plan_of
 from lie_codegen.steering.direct.search import threshold
 from lie_codegen.steering.plan import Plan, Status
@@ -67,10 +67,10 @@ def least_time(
     letters, velocities = letters_of(task, vertices)
     solver = machine(task.system.group, 1)
     arcs = replace(task, low=np.zeros(1), high=np.ones(1), weights=np.ones(1))
-    limits = longest_useful(task, velocities, longest)
+    descent = WordDescent(arcs, solver, velocities, longest_useful(task, velocities, longest), settings, longest)
     tried: list[str] = []
-    best: list[tuple[float, Array, Array, int]] = []
-    nearest: tuple[float, Array, Array, int] | None = None
+    best: list[Candidate] = []
+    nearest: Candidate | None = None
     total = reached = agree = 0
     n = task.system.group.dim
     for round_ in range(rounds):
@@ -84,7 +84,7 @@ def least_time(
             ("long words", long_words(len(letters), long, 4 * starts, rng)),
             ("long words without zeros", bangs[long_words(len(bangs), long, 2 * starts, rng)]),
         ):
-            found, near = _solve(arcs, solver, velocities, limits, words, settings, longest, rng)
+            found, near = _solve(descent, words, rng)
             nearest = near if nearest is None or near[0] < nearest[0] else nearest
             total += len(words)
             reached += len(found)
@@ -100,11 +100,11 @@ def least_time(
     if not best:
         raise _not_found(task, target, tolerance, letters, nearest, tried, total, seed, longest, began)
     best = [
-        *(sharpened(arcs, solver, velocities, limits, each, settings, longest) for each in best[:_SHARPENED]),
+        *(descent.sharpened(each) for each in best[:_SHARPENED]),
         *best[_SHARPENED:],
     ]
     best.sort(key=lambda each: each[0])
-    best[0] = with_other_arcs(arcs, solver, velocities, limits, best[0], settings, longest)
+    best[0] = descent.with_other_arcs(best[0])
     # The shortest word that the simulated system confirms.
     for _, word, durations, variant in best[:_KEPT]:
         flown, sequence = _flown(task, letters, word, durations, variant)
@@ -133,7 +133,7 @@ def _not_found(
     target: Any,
     tolerance: float,
     letters: Array,
-    nearest: tuple[float, Array, Array, int] | None,
+    nearest: Candidate | None,
     tried: list[str],
     total: int,
     seed: int,
@@ -165,20 +165,12 @@ def _not_found(
     return SteeringError(said, best=plan, violation=plan.violation)
 
 
-def _solve(
-    arcs: Manoeuvre,
-    solver: Machine,
-    velocities: Array,
-    limits: Array,
-    words: Array,
-    settings: Settings,
-    longest: float,
-    rng: np.random.Generator,
-) -> tuple[list[tuple[float, Array, Array, int]], tuple[float, Array, Array, int]]:
+def _solve(descent: WordDescent, words: Array, rng: np.random.Generator) -> tuple[list[Candidate], Candidate]:
     """(duration, word, durations, variant) of words that reach the goal, the shortest of them descended; and (residual, word,
     durations, variant) of the nearest."""
+    arcs, solver, limits, settings = descent.arcs, descent.solver, descent.limits, descent.settings
     lanes, count = words.shape
-    programme = words_programme(arcs, velocities, words, longest)
+    programme = descent.programme(words)
     variant = np.arange(lanes) % len(arcs.end.values)
     # durations that add up to between a third and three times the given one
     parts = rng.dirichlet(np.ones(count), lanes) * (3.0 ** rng.uniform(-1, 1, (lanes, 1)))
@@ -200,10 +192,8 @@ def _solve(
     lower = solver.descend(part, aim, found.u[there], settings)
     results = []
     for lane, number in enumerate(there):
-        word, durations, size = tidied(
-            arcs, solver, velocities, limits, words[number], lower.u[lane], int(variant[number]), settings, longest
-        )
-        if size <= threshold(arcs, settings) and np.sum(arcs.own(durations)) <= longest:
+        word, durations, size = descent.tidied(words[number], lower.u[lane], int(variant[number]))
+        if size <= threshold(arcs, settings) and np.sum(arcs.own(durations)) <= descent.longest:
             results.append((float(np.sum(arcs.own(durations))), word, durations, int(variant[number])))
     return results, near
 
