@@ -75,3 +75,39 @@ def test_shortest_ways_with_straight_arcs_are_reached_in_just_their_time(
     turned = sum(length for u, length in zip(word, lengths, strict=True) if u)
     assert plan.cost <= turned * (1 + 1e-6)
     assert np.max(np.abs(plan.inputs(np.linspace(0, plan.duration, 501)))) <= 1 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "controls", "drift", "word", "lengths"),
+    [
+        ("sl2", ("e", "f"), None, ((1, -1), (1, 1), (1, -1)), (0.068702770, 0.024446284, 1.406850946)),
+        ("se2", ("omega",), (0, 1, 0), ((1,), (-1,), (1,)), (0.749071963, 0.044601187, 4.20632685)),
+        (
+            "su3",
+            ("l1", "l4", "l6"),
+            None,
+            ((-1, 1, 1), (-1, -1, -1), (1, -1, -1), (-1, -1, 1)),
+            (0.069033935, 1.963180075, 0.022570190, 0.9452158),
+        ),
+    ],
+)
+def test_arcs_shorter_than_a_piece_are_found_by_narrowing_the_bounds(
+    name: str, controls: tuple[str, ...], drift: Any, word: tuple[tuple[int, ...], ...], lengths: tuple[float, ...]
+) -> None:
+    """No equal pieces have such an arc, and its mean over a piece hides it."""
+    group = lc.group(name)
+    columns = np.eye(group.dim)[[group.labels.index(label) for label in controls]]
+    free = np.zeros(group.dim) if drift is None else np.array(drift, dtype=float)
+    X = np.eye(group.degree, dtype=group.basis.dtype)
+    for u, length in zip(word, lengths, strict=True):
+        X = X @ expm(group.hat(length * (free + np.array(u) @ columns)))
+    options = {} if drift is None else {"drift": drift}
+    plan = lc.steer(group, X, controls, float(np.sum(lengths)), bounds=1, **options)
+    assert plan.error < 1e-8
+    assert np.max(np.abs(plan.inputs(np.linspace(0, plan.duration, 2001)))) <= 1 + 1e-9
+    if plan.details["winner"] == "direct, arcs with free ends":
+        knots = np.concatenate([[0.0], plan.u.breakpoints, [plan.duration]])
+        end = np.eye(group.degree, dtype=group.basis.dtype)
+        for a, b in pairwise(knots):
+            end = end @ expm(group.hat((b - a) * (free + plan.inputs((a + b) / 2) @ columns)))
+        np.testing.assert_allclose(end, X, atol=1e-8)

@@ -20,6 +20,7 @@ from lie_codegen.steering.direct.around import around
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces
 from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.compiled import machine
+from lie_codegen.steering.direct.continuation import tightened
 from lie_codegen.steering.direct.guess import guessed
 from lie_codegen.steering.direct.least_time import least_time
 from lie_codegen.steering.direct.outcome import not_found, plan_at_the_edge, smoother
@@ -32,6 +33,8 @@ from lie_codegen.steering.direct.search import LARGE, Budget, search
 from lie_codegen.steering.direct.switches import switched
 from lie_codegen.steering.plan import Plan
 
+#: Of the starts whose bounds were narrowed, how many are read as arcs.
+_FARTHEST = 12
 #: Steps of a descent on large groups, where each takes a tenth of a second.
 _LARGE_DESCENT = 40
 
@@ -149,7 +152,10 @@ def _searched(
     programme = constant_pieces(task, count)
     found = search(task, programme, solver, budget, guessed(task, guess, count), say)
     if not found.arrived:
-        edge = switched(task, found.near)
+        nearest = found.near
+        found = tightened(task, programme, solver, budget, found)
+    if not found.arrived:
+        edge = switched(task, found.near[:_FARTHEST]) or switched(task, nearest)
         if edge is not None:
             return plan_at_the_edge(task, target, found, *edge, budget, tolerance, objective, began)
         raise not_found(task, target, found, budget, tolerance, began)

@@ -17,6 +17,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre, programme_of
 from lie_codegen.steering.direct.chain import linearise
+from lie_codegen.steering.direct.continuation import read_arcs
 from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.magnus_flow import end_reached
 from lie_codegen.steering.direct.polish import Flown
@@ -52,6 +53,11 @@ def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown,
     if not task.system.steady or not bounded or any(task.free_slots):
         return None
     scale = max(1.0, float(np.max(np.abs(task.end.values))))
+    for u, variant in near:
+        durations, letters = read_arcs(task, u)
+        flown = _flown(task, *_settled(task, durations, letters, np.zeros(letters.shape, dtype=bool), variant), variant)
+        if flown.miss <= _THERE * scale:
+            return flown, variant
     for number, (u, variant) in enumerate(near):
         bang = np.where(u < (task.low + task.high) / 2, task.low, task.high)
         tries: list[_Try] = [(*_arcs(task, u, _BLUR), None), (*_arcs(task, bang, _BLUR), None)]
@@ -66,23 +72,22 @@ def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown,
         for place, each in enumerate([*tries, *wider]):
             if place == len(tries) and nearest > _MISSED * scale:
                 break  # an arc shorter than a piece does not make up for that
-            flown = _ended(task, each, variant)
+            flown = _flown(task, *_settled(task, *each, variant), variant)
             if flown.miss <= _THERE * scale:
                 return flown, variant
             nearest = min(nearest, flown.miss)
     return None
 
 
-def _ended(task: Manoeuvre, given: _Try, variant: int) -> Flown:
-    """The arcs, brought as near to the goal as they come, and flown."""
-    s, v, moving = given
+def _settled(task: Manoeuvre, s: Array, v: Array, moving: Array | None, variant: int) -> tuple[Array, Array]:
+    """The arcs, brought as near to the goal as they come, without those that are all but gone."""
     durations, controls = _solved(task, s, v, moving, variant)
     # the piece in which a switch was shrinks without end: the steps get on when it is gone
     long = durations > _BRIEF * task.duration
     if not np.all(long) and np.any(long):
         rest = None if moving is None else moving[long]
         durations, controls = _solved(task, durations[long], controls[long], rest, variant)
-    return _flown(task, durations, controls, variant)
+    return durations, controls
 
 
 def _arcs(task: Manoeuvre, u: Array, alike: float) -> tuple[Array, Array]:
