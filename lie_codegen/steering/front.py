@@ -189,7 +189,7 @@ def steer(
     if unknown:
         known = set(inspect.signature(steer).parameters) - {"unknown"}
         raise SteeringInputError(unknown_keywords(f"steer({group.name})", unknown, known))
-    options = {name: value for name, value in given.items() if name not in _TASK and value is not None}
+    options = {name: value for name, value in given.items() if value is not None and name not in _TASK}
     check_options(f"steer({group.name})", method, options)
     plan = _found(_Asked(group, target, controls, duration, method, tolerance, options))
     if isinstance(target, GoalSet) or np.shape(target) != (group.degree, group.degree):

@@ -109,11 +109,13 @@ def descend(look: Look, box: Box, u: Array, settings: Settings) -> Reached:
             break
         v, multipliers = _proximal(box, settings.fuel, at.lanes(act), y[act], rho[act])
         trial = look(act, v)
+        # v keeps to the linearised goal and leaves the true one by the flow's curvature: it is brought back, and what is cheaper then counts
         _arrive(look, act, box, trial, 12, settings.enough, 1e-9, len(act) + 1)
         cost = box.objective(settings.fuel, trial.u)
         better = (trial.size < enough) & (cost < best[act])
         small = better & (best[act] - cost <= settings.relative * best[act])
         quiet[act] = np.where(small, quiet[act] + 1, np.where(better, 0, quiet[act]))
+        # a shorter step where the model promised too much, a longer one where it kept its word
         rho[act] = np.where(better, np.maximum(rho[act] / 3, 1e-6), rho[act] * 4)
         rows = act[better]
         at.take(rows, trial, better)
