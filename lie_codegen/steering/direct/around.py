@@ -1,4 +1,4 @@
-"""method="direct" among obstacles: ways around them as guesses beside the straight one, stages 1 and 2 with gaps that are kept, an own flight.
+"""method="direct" among obstacles: ways around them as guesses beside the straight one, stages 1 and 2 with gaps that are kept, an integration of its own.
 
 The ways come from `obstacles`: words of discs in the plane, a sampled roadmap otherwise; no way is of the system. Controls follow each as
 nearly as they can while they reach the goal, then leave it and only stay clear (stage 1), then become cheap (stage 2). Between the nodes

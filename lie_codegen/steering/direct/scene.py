@@ -144,7 +144,7 @@ class Scene:
     def course(self, pieces: int, variant: int, margins: Array | None = None) -> Course:
         """The programme of that many pieces among the obstacles."""
         task = self.task
-        speed = 4.0 / task.duration  # steps follow the flight that corrects; the search needs no more
+        speed = 4.0 / task.duration  # steps follow the integration that corrects; the search needs no more
         steps = int(np.clip(np.ceil(_APART * self.travel / (pieces * np.min(self.keep_out.sizes))), 1, _STEPS))
         programme = linear_pieces(task, pieces, speed, steps) if self.linear else constant_pieces(task, pieces, steps)
         first, last = task.free_slots
@@ -233,7 +233,7 @@ class Scene:
             )
             v, _, _ = cheaper(course, v, limit)
             v, task, flown = self._confirmed(course, v, variant)
-            X = self.flight(flown)
+            X = self.states(flown)
             gaps = _least(self.keep_out.gaps(X))
             through = tunnels(self.obstacles, X)
             clearance = -1.0 if through else float(np.min(gaps))
@@ -271,7 +271,7 @@ class Scene:
         shape, flown = corrected(task, solver, course.programme, shape, variant, self.linear, self.settings)
         return shape.ravel(), task, flown
 
-    def flight(self, flown: Flown) -> Array:
+    def states(self, flown: Flown) -> Array:
         """States of the true system, so many that it moves by little between two, or cannot meet an obstacle there."""
         step = _LOOK * float(np.min(self.keep_out.sizes))
         drive, parts = Drive(self.task.system, flown.inputs), 4
@@ -284,7 +284,7 @@ class Scene:
 
     def clearances(self, flown: Flown) -> tuple[float, ...]:
         """Least of each obstacle's own clearance along the way."""
-        X = self.flight(flown)
+        X = self.states(flown)
         return tuple(float(np.min(each.clearance(X))) for each in self.obstacles)
 
     def named(self, good: Sequence[Result]) -> tuple[dict[str, Any], ...]:

@@ -17,7 +17,7 @@ from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Status
 
 #: What simulates a plan knows the solver, which stands above this file, and is loaded when it is asked for.
-FLIGHT = "lie_codegen.steering.ocp.flight"
+SIMULATION = "lie_codegen.steering.ocp.simulation"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,7 +88,7 @@ class OptimalPlan(Saved):
 
     def __simulate__(self, group: MatrixGroup | None, **options: Any) -> Any:
         """`lc.simulate` of this plan."""
-        return import_module(FLIGHT).simulated(self, group, **options)
+        return import_module(SIMULATION).simulated(self, group, **options)
 
     @property
     def group(self) -> Any:

@@ -29,9 +29,9 @@ def classes_found(
         return ()
     best: dict[str, dict[str, Any]] = {}
     for each in sorted((one for one in candidates if one.admissible), key=lambda one: one.objective):
-        if each.flight is None:
+        if each.motion is None:
             continue
-        way = each.flight.X[:, :2, 2]
+        way = each.motion.X[:, :2, 2]
         word = word_text(discs.word(way))
         clear = float(np.min(discs.clearance(way)))
         cost = each.duration * duration if time else each.objective / duration
@@ -45,6 +45,6 @@ def nearest_flown(task: Task, numbers: Numbers, candidates: Sequence[Candidate])
     if not usable:
         return None
     nearest = min(usable, key=lambda each: (each.violation, each.miss))
-    if nearest.flight is not None:
+    if nearest.motion is not None:
         return nearest
-    return replace(nearest, flight=simulated_path(task.group, task.controls, numbers, nearest.values, nearest.duration))
+    return replace(nearest, motion=simulated_path(task.group, task.controls, numbers, nearest.values, nearest.duration))

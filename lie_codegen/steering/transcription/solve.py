@@ -71,7 +71,7 @@ class Candidate:
         violation: of the constraints by the program's answer, infinite if the end is missed.
         target: (d, d) the element of the goal that it was to end at.
         miss: of the target by the true system, or how deep it cuts an obstacle.
-        flight: of the true system; None where the program's conditions are not kept.
+        motion: of the true system; None where the program's conditions are not kept.
         solution: all variables.
         solves: the calls of the solver, the last one gave this.
     """
@@ -82,7 +82,7 @@ class Candidate:
     violation: float
     target: Array
     miss: float
-    flight: SimulatedPath | None
+    motion: SimulatedPath | None
     solution: Array
     solves: tuple[Solve, ...]
 
@@ -136,21 +136,21 @@ def refined(bench: Workbench, name: str, start: Array, first_end: ProgramEnd) ->
                 solve.objective, values, duration, solve.violation, target, np.inf, None, solution, tuple(solves)
             )
             return failed if best is None else replace(best, solves=tuple(solves))
-        flight = simulated_path(task.group, task.controls, numbers, values, duration)
-        if tunnels(numbers.obstacles, flight.X):
+        motion = simulated_path(task.group, task.controls, numbers, values, duration)
+        if tunnels(numbers.obstacles, motion.X):
             # through a seam between discs, in one fast step: to enlarge the discs would find the next seam
             tunnel = Candidate(
-                solve.objective, values, duration, solve.violation, target, np.inf, flight, solution, tuple(solves)
+                solve.objective, values, duration, solve.violation, target, np.inf, motion, solution, tuple(solves)
             )
             return tunnel if best is None else replace(best, solves=tuple(solves))
-        cut = np.array([max(0.0, -float(np.min(each.clearance(flight.X)))) for each in numbers.obstacles])
-        relative = np.linalg.solve(flight.X[-1], target)
-        slip = np.zeros(task.group.dim) if second is None else second.ends[1] - flight.xi[-1]
+        cut = np.array([max(0.0, -float(np.min(each.clearance(motion.X)))) for each in numbers.obstacles])
+        relative = np.linalg.solve(motion.X[-1], target)
+        slip = np.zeros(task.group.dim) if second is None else second.ends[1] - motion.xi[-1]
         off = float(max(np.max(np.abs(relative - np.eye(task.group.degree))), np.max(np.abs(slip))))
         deepest = float(np.max(cut, initial=0.0))
         miss = max(off, deepest)
         candidate = Candidate(
-            solve.objective, values, duration, solve.violation, target, miss, flight, solution, tuple(solves)
+            solve.objective, values, duration, solve.violation, target, miss, motion, solution, tuple(solves)
         )
         settled = float(np.max(np.abs(h), initial=0.0)) <= _SETTLED
         if best is None or candidate.miss < best.miss or (moving and candidate.miss <= FEASIBLE):

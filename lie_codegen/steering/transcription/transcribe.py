@@ -140,10 +140,10 @@ def _candidates(bench: Workbench, asked: Options) -> list[Candidate]:
 
 def _idle(numbers: Numbers, candidate: Candidate) -> bool:
     """Whether no obstacle holds a candidate."""
-    flight = candidate.flight
-    if flight is None:
+    motion = candidate.motion
+    if motion is None:
         return False
-    return all(float(np.min(each.clearance(flight.X))) > _IDLE for each in numbers.obstacles)
+    return all(float(np.min(each.clearance(motion.X))) > _IDLE for each in numbers.obstacles)
 
 
 def _guesses(bench: Workbench, asked: Options) -> Iterator[tuple[str, Array]]:
@@ -166,8 +166,8 @@ def _plan(
 ) -> Plan:
     values = best.values / task.duration**numbers.power
     duration = best.duration * task.duration
-    group, flight, last = task.group, best.flight, best.solves[-1]
-    if flight is None:
+    group, motion, last = task.group, best.motion, best.solves[-1]
+    if motion is None:
         raise ValueError("an admissible candidate has been simulated")
     a, b = values[:-1], values[1:]
     details: dict[str, Any] = {
@@ -182,16 +182,16 @@ def _plan(
         "solves": tuple(solve for each in candidates for solve in each.solves),
         "objective": "time" if structure.free_time else "energy",
         "discretisation": "controls continuous and linear on each interval: the cost is an upper bound of the optimum's",
-        "clearances": tuple(float(np.min(obstacle.clearance(flight.X))) for obstacle in numbers.obstacles),
+        "clearances": tuple(float(np.min(obstacle.clearance(motion.X))) for obstacle in numbers.obstacles),
         "control_peaks": tuple(float(x) for x in np.max(np.abs(values), axis=0)),
         "drift": numbers.drift / task.duration,
         "optimality": "a local minimum of the discretised problem, the best of the starts tried",
-        "fine_times": flight.t * task.duration,
+        "fine_times": motion.t * task.duration,
         "classes": classes_found(numbers, candidates, task.duration, time=structure.free_time),
     }
-    error, slip = distance(group, best.target, flight.X[-1]), 0.0
+    error, slip = distance(group, best.target, motion.X[-1]), 0.0
     if numbers.dynamics is not None:
-        second, xi = numbers.dynamics, flight.xi / task.duration
+        second, xi = numbers.dynamics, motion.xi / task.duration
         slip = float(np.linalg.norm(xi[-1] - second.ends[1] / task.duration))
         details |= {
             "dynamics": "second order: u is torque",
@@ -216,6 +216,6 @@ def _plan(
         u=piecewise_linear(group, task.controls, values, duration),
         cost=float(np.sum(a * a + a * b + b * b)) * duration / (3 * structure.intervals),
         outcome=Facts(
-            flight.X[-1], error, status or (Status.LOCAL if solved else Status.NOT_CONVERGED), details, seconds
+            motion.X[-1], error, status or (Status.LOCAL if solved else Status.NOT_CONVERGED), details, seconds
         ),
     )
