@@ -141,7 +141,7 @@ EXPORT ptrdiff_t magnus_solve(Solve *s)
     }
     status = run(s, 1, s->coarse);
     while (status == REACHED) {
-        double scale = 1.0, difference = 0.0, goal, lowest, needed;
+        double scale = 1.0, difference = 0.0, goal, lowest, ratio, needed;
         if (base * multiple > s->most) {
             return TOO_MANY;
         }
@@ -163,7 +163,9 @@ EXPORT ptrdiff_t magnus_solve(Solve *s)
             difference = larger(apart, difference);
         }
         scale = sqrt(scale);
-        s->estimate = sqrt(difference) / (pow((double)multiple / (double)before, trust) - 1.0);
+        difference = sqrt(difference);
+        ratio = (double)multiple / (double)before;
+        s->estimate = difference / (pow(ratio, trust) - 1.0);
         goal = larger(s->rtol * scale, s->atol);
         lowest = 4e-16 * scale * sqrt((double)s->steps); /* what rounding leaves after so many products, as a random walk */
         if (s->estimate <= larger(goal, lowest)) {
@@ -176,8 +178,11 @@ EXPORT ptrdiff_t magnus_solve(Solve *s)
             }
             return REACHED;
         }
-        /* The next run should reach half the goal; it is at least half as fine again, so that the two can be compared. */
-        needed = pow(s->estimate / larger(0.5 * goal, lowest), 1.0 / (double)s->order);
+        /*
+         * The next run should reach half the goal, by the order as it is: what a run is held to does not depend on how it was chosen. It is at least
+         * half as fine again, so that the two can be compared.
+         */
+        needed = pow(difference / (pow(ratio, (double)s->order) - 1.0) / larger(0.5 * goal, lowest), 1.0 / (double)s->order);
         needed = needed < 1.5 ? 1.5 : needed > 8.0 ? 8.0 : needed;
         before = multiple;
         trust = (double)s->order;

@@ -138,14 +138,15 @@ def _led_by_python(
         fine = _finite(flow(group, drive, steps, order, X0, threads, single), where)
         scale = max(1.0, float(np.max(np.abs(fine))))
         difference = float(np.max(np.abs(fine - coarse), initial=0.0))
-        estimate = difference / ((multiple / before) ** trust - 1)
+        ratio = multiple / before
+        estimate = difference / (ratio**trust - 1)
         goal = max(rtol * scale, atol)
         floor = scale * (_single_floor(group, drive, steps) if single else 4e-16 * np.sqrt(steps.count))
         if estimate <= max(goal, floor):
             known = (max(estimate, floor) if single else estimate) + drive.error * scale
             return MagnusRun(fine, order, multiple, steps.count, steps.longest, steps.shortest, known)
-        # The next run should reach half the goal; it is at least half as fine again, so that the two can be compared.
-        needed = (estimate / max(goal / 2, floor)) ** (1 / order)
+        # The next run should reach half the goal, by the order as it is; it is at least half as fine again, so that the two can be compared.
+        needed = (difference / (ratio**order - 1) / max(goal / 2, floor)) ** (1 / order)
         before, coarse, trust = multiple, fine, order
         multiple = int(np.ceil(multiple * min(max(needed, 1.5), _LARGEST_LEAP)))
 
