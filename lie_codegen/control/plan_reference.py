@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.reference_motion import PlanReference
-from lie_codegen.control.waypoints import logarithm, quintic
+from lie_codegen.control.waypoints import logarithm, quintics
 from lie_codegen.errors import ComputationError, InputError, ShapeError
 from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -195,18 +195,27 @@ def _refined(
         path[order] = plan.X(asked[order])
         X, between = path[: len(t)], path[len(t) :].reshape(len(spans), 3, group.degree, group.degree)
         error = np.full(len(spans), np.inf)
-        for i, span in enumerate(spans):
-            key = (float(t[i]), float(t[i + 1]))
-            if key not in rows:
-                a, b = knots[key[0]], knots[key[1]]
-                move = logarithm(derivation, np.linalg.solve(X[i], X[i + 1]))
-                rows[key] = (
-                    None if move is None else quintic(derivation, move, a.xi, b.xi, float(span), (a.rate, b.rate))
-                )
+        ends = [(float(a), float(b)) for a, b in pairwise(t)]
+        new = [i for i, key in enumerate(ends) if key not in rows]
+        moves = {i: logarithm(derivation, np.linalg.solve(X[i], X[i + 1])) for i in new}
+        joined = {i: move for i, move in moves.items() if move is not None}
+        rows |= {ends[i]: None for i in new}
+        if joined:
+            first, last = ([knots[ends[i][side]] for i in joined] for side in (0, 1))
+            made = quintics(
+                derivation,
+                np.array(list(joined.values())),
+                np.array([knot.xi for knot in first]),
+                np.array([knot.xi for knot in last]),
+                spans[list(joined)],
+                (np.array([knot.rate for knot in first]), np.array([knot.rate for knot in last])),
+            )
+            rows |= {ends[i]: row for i, row in zip(joined, made, strict=True)}
+        for i, key in enumerate(ends):
             row = rows[key]
             if row is not None:
-                made = X[i] @ scipy.linalg.expm(np.array([group.hat(s ** np.arange(6) @ row) for s in inside]))
-                error[i] = float(np.max(np.abs(made - between[i])))
+                passed = X[i] @ scipy.linalg.expm(np.array([group.hat(s ** np.arange(6) @ row) for s in inside]))
+                error[i] = float(np.max(np.abs(passed - between[i])))
         smoothed = np.array([knots[float(each)].smoothed for each in t[:-1]])
         lost = np.flatnonzero(smoothed & ~np.isfinite(error))
         if len(lost):

@@ -20,6 +20,7 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.kernel.dual import Dual, DualArithmetic, tangent_of
 from lie_codegen.kernel.linear import matvec
+from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 
 #: How far a waypoint may lie off the group, relative to its size.
 _ON_GROUP = 1e-8
@@ -65,8 +66,7 @@ def waypoint_reference(group: MatrixGroup, times: ArrayLike, waypoints: ArrayLik
     speed = np.zeros((len(t), group.dim))
     weight = spans[1:] / (spans[1:] + spans[:-1])
     speed[1:-1] = weight[:, None] * mean[:-1] + (1 - weight)[:, None] * mean[1:]
-    table = [quintic(derivation, moves[i], speed[i], speed[i + 1], spans[i]) for i in range(len(spans))]
-    return WaypointReference(group, t, X, np.array(table))
+    return WaypointReference(group, t, X, quintics(derivation, moves, speed[:-1], speed[1:], spans))
 
 
 def _relative_log(derivation: GroupDerivation, X: NDArray[Any], Y: NDArray[Any], index: int) -> NDArray[Any]:
@@ -104,30 +104,46 @@ def _numbers(X: Sequence[Sequence[Any]]) -> NDArray[Any]:
     return np.array([[complex(z.re, z.im) if isinstance(z, Complex) else float(z) for z in row] for row in X])
 
 
-def quintic(
+def quintics(
     derivation: GroupDerivation,
-    move: NDArray[Any],
+    moves: NDArray[Any],
     first: NDArray[Any],
     last: NDArray[Any],
-    span: float,
+    spans: NDArray[Any],
     bends: tuple[NDArray[Any], NDArray[Any]] | None = None,
 ) -> NDArray[Any]:
-    """(6, n): p(0) = 0, p(1) = move, body velocities first and last [1/s], body accelerations [1/s^2] zero if not given.
+    """(k, 6, n), all segments at once: p(0) = 0, p(1) = move, body velocities first and last [1/s], body accelerations [1/s^2] zero if not given.
 
     From xi = J(p) p': xi' = J(p) p'' + (dJ/dt) p', and (dJ/dt) p' = -[p', p']/2 = 0 at p = 0.
+
+    Args:
+        derivation: of the group.
+        moves, first, last: (k, n).
+        spans: (k,) [s].
+        bends: (k, n) accelerations at both ends.
     """
-    ops = FloatArithmetic()
-    inverse = np.array(jacobian(ops, derivation, [float(x) for x in move], "right", inverse=True), dtype=float)
-    rate = inverse @ last * span
+    ops, span = NumpyArithmetic(), spans[:, None]
     dual = DualArithmetic(ops)
-    moving = [dual.variable(float(a), {0: float(b)}) for a, b in zip(move, rate, strict=True)]
-    turning = matvec(jacobian(dual, derivation, moving, "right", inverse=False), [float(r) for r in rate])
-    begin, end = (np.zeros_like(move), np.zeros_like(move)) if bends is None else (b * span**2 for b in bends)
-    bend = inverse @ (end - np.array([float(tangent_of(x)) if isinstance(x, Dual) else 0.0 for x in turning]))
+    with np.errstate(all="ignore"):  # both sides of a branch are evaluated
+        inverse = _stacked(jacobian(ops, derivation, list(moves.T), "right", inverse=True), len(moves))
+        rate = np.einsum("kij,kj->ki", inverse, last) * span
+        moving = [dual.variable(a, {0: b}) for a, b in zip(moves.T, rate.T, strict=True)]
+        turning = matvec(jacobian(dual, derivation, moving, "right", inverse=False), list(rate.T))
+        turned = _stacked([[tangent_of(x) if isinstance(x, Dual) else 0.0 for x in turning]], len(moves))[:, 0]
+    begin, end = (np.zeros_like(moves),) * 2 if bends is None else (each * span**2 for each in bends)
+    bend = np.einsum("kij,kj->ki", inverse, end - turned)
     start = first * span
     conditions = np.array([[1, 1, 1], [3, 4, 5], [6, 12, 20]], dtype=float)
-    rest = np.linalg.solve(conditions, np.array([move - start - begin / 2, rate - start - begin, bend - begin]))
-    return np.vstack([np.zeros_like(move), start, begin / 2, rest])
+    asked = np.stack([moves - start - begin / 2, rate - start - begin, bend - begin], axis=1)
+    rest = np.linalg.solve(conditions, asked)
+    return np.concatenate([np.zeros_like(moves)[:, None], start[:, None], begin[:, None] / 2, rest], axis=1)
+
+
+def _stacked(matrix: Sequence[Sequence[Any]], count: int) -> NDArray[Any]:
+    """(k, rows, columns) of entries that are numbers or (k,) each."""
+    return np.moveaxis(
+        np.array([[np.broadcast_to(entry, count) for entry in row] for row in matrix], dtype=float), -1, 0
+    )
 
 
 #: Samples at most: each segment is a row of the tables that are compiled.
@@ -165,16 +181,6 @@ def sampled_reference(group: MatrixGroup, times: ArrayLike, samples: ArrayLike) 
         powers = ((t[near] - t[i]) / width)[:, None] ** np.arange(1, 5)
         fit = np.linalg.solve(powers, moves)
         speed[i], bend[i] = fit[0] / width, 2 * fit[1] / width**2
-    spans = np.diff(t)
-    table = [
-        quintic(
-            derivation,
-            _relative_log(derivation, X[i], X[i + 1], i),
-            speed[i],
-            speed[i + 1],
-            float(spans[i]),
-            (bend[i], bend[i + 1]),
-        )
-        for i in range(len(spans))
-    ]
-    return WaypointReference(group, t, X, np.array(table))
+    moves = np.array([_relative_log(derivation, X[i], X[i + 1], i) for i in range(len(t) - 1)])
+    table = quintics(derivation, moves, speed[:-1], speed[1:], np.diff(t), (bend[:-1], bend[1:]))
+    return WaypointReference(group, t, X, table)
