@@ -15,7 +15,7 @@ from lie_codegen.codegen.library_sources import LibrarySources
 from lie_codegen.codegen.numerics import NUMERICS_VERSION
 from lie_codegen.codegen.opcodes import REALS, Target
 from lie_codegen.codegen.signature import Signature, is_step
-from lie_codegen.codegen.stack import stack_bytes
+from lie_codegen.codegen.stack import package_stack
 from lie_codegen.codegen.tape import tape_of
 from lie_codegen.codegen.templates import render
 from lie_codegen.codegen.vectors import TestVector, make_vectors
@@ -73,7 +73,7 @@ def render_package(
         (shown, _rows(kernel, each, target)) for shown, kernel, each in zip(view.kernels, kernels, vectors, strict=True)
     ]
     more = sorted(extra or {})
-    stack = {kernel.symbol: most for kernel in view.kernels if (most := stack_bytes(kernel)) is not None}
+    stack = package_stack(view)
     files = {
         "sources": [f"src/{namespace}.c", *(path for path in more if path.startswith("src/") and path.endswith(".c"))],
         "headers": [f"include/{namespace}.h", *(path for path in more if path.startswith("include/"))],

@@ -8,32 +8,52 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from lie_codegen.codegen.frames import FRAME, LIBRARY
+from lie_codegen.codegen.routine_stack import routine_stack
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from lie_codegen.codegen.views import KernelView, StatementView
-
-#: Bytes of a frame beside its values: registers saved, arguments passed on the stack, alignment. Bytes of libm below a kernel.
-FRAME, LIBRARY = 320, 2048
+    from lie_codegen.codegen.views import KernelView, PackageView, StatementView
 
 
-def stack_bytes(kernel: KernelView) -> int | None:
-    """Bytes of stack of a kernel with all that it calls; None if it runs a routine, whose loops have arrays of their own.
+def package_stack(package: PackageView) -> dict[str, int]:
+    """{symbol: bytes of stack} of the functions of a package, with all that each calls, libm included. One that runs a routine whose C
+    cannot be read has none.
 
     A float takes no more than the double that is counted.
     """
+    helpers: dict[str, int] = {}
+    routines: dict[str, int] = {}
+    for routine in package.routines:  # a helper is printed with the first routine that calls it
+        helpers |= {each.symbol: _bytes(each, routines) for each in routine.helpers}
+        if (most := routine_stack(routine.text, routine.name, helpers)) is not None:
+            routines[routine.name] = most
+    called = {each.symbol: _routines_of(each) for each in package.kernels}
+    return {
+        each.symbol: _round_up(_bytes(each, routines) + LIBRARY)
+        for each in package.kernels
+        if called[each.symbol] <= routines.keys()
+    }
+
+
+def _routines_of(kernel: KernelView) -> set[str]:
     pieces = [kernel.statements, *(part.statements for part in kernel.parts)]
-    if any(statement.results for piece in pieces for statement in piece):
-        return None
+    return {each.expression for piece in pieces for each in piece if each.results}
+
+
+def _bytes(kernel: KernelView, routines: Mapping[str, int]) -> int:
     ports = len(kernel.inputs) + len(kernel.outputs) + 1
     # a part has returned before the next is called
-    part = max((_values(each.statements, ports) for each in kernel.parts), default=0)
-    return _round_up(_values(kernel.statements, ports) + 8 * kernel.work_size + part + LIBRARY)
+    part = max((_values(each.statements, ports, routines) for each in kernel.parts), default=0)
+    return _values(kernel.statements, ports, routines) + 8 * kernel.work_size + part
 
 
-def _values(statements: Sequence[StatementView], ports: int) -> int:
-    """Bytes of a frame that holds a value a statement and the arguments."""
-    return 8 * (len(statements) + ports) * 3 // 2 + FRAME
+def _values(statements: Sequence[StatementView], ports: int, routines: Mapping[str, int]) -> int:
+    """Bytes of a frame that holds a value a statement and the arguments, and of the deepest routine that it calls."""
+    arrays = sum(each.results + len(each.arguments) for each in statements)
+    below = max((routines.get(each.expression, 0) for each in statements if each.results), default=0)
+    return 8 * (len(statements) + arrays + ports) * 3 // 2 + FRAME + below
 
 
 def _round_up(value: int) -> int:

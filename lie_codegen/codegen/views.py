@@ -120,6 +120,7 @@ class RoutineView:
     helpers: tuple[KernelView, ...]
     text: str
     type_name: str
+    name: str
 
 
 @dataclass(frozen=True)
@@ -190,7 +191,9 @@ def _routine_views(routines: Iterable[Routine], target: Target) -> tuple[Routine
         if own.type_name == "float":
             settings |= dict(routine.single or ())
         text = render(routine.template, name=routine.name, **settings)
-        views.append(RoutineView(helpers, in_single(text) if own.type_name == "float" else text, own.type_name))
+        views.append(
+            RoutineView(helpers, in_single(text) if own.type_name == "float" else text, own.type_name, routine.name)
+        )
     return tuple(views)
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
 
 import pytest
+from call_chains import deepest
 
 import lie_codegen as lc
 from lie_codegen.algebra.controllability import require_controllable
-from lie_codegen.codegen.stack import LIBRARY
+from lie_codegen.codegen.frames import LIBRARY
 from lie_codegen.steering.shooting.package import render_steering_package
 from lie_codegen.steering.shooting.source import steering_view
 from lie_codegen.steering.shooting.stack import LANES, stack_bytes, workspace_bytes
@@ -88,23 +88,6 @@ def write(name: str, controls: tuple[str | int, ...], folder: Path) -> None:
     for path, text in render_steering_package(lc.group(name), controls).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)
-
-
-def deepest(graph: str, entry: str = "") -> int:
-    """Bytes of the deepest chain of calls, from a function if one is named, in a graph of gcc's -fcallgraph-info=su."""
-    own = {
-        title: int(size) for title, size in re.findall(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n(\d+) bytes', graph)
-    }
-    calls: dict[str, set[str]] = {}
-    for source, target in re.findall(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', graph):
-        calls.setdefault(source, set()).add(target)
-
-    @cache
-    def below(title: str) -> int:
-        return own.get(title, 0) + max((below(target) for target in calls.get(title, ())), default=0)
-
-    assert own
-    return below(entry) if entry else max(map(below, own))
 
 
 def compile_core(name: str, controls: tuple[str | int, ...], lanes: int, level: str, folder: Path) -> str:

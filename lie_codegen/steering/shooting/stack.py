@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lie_codegen.codegen.stack import FRAME, LIBRARY
+from lie_codegen.codegen.frames import FRAME, LIBRARY
 
 if TYPE_CHECKING:
     from lie_codegen.steering.shooting.views import SteeringView
