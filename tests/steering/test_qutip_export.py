@@ -23,6 +23,19 @@ def test_qutip_solves_the_plan_to_its_gate(equation: str, polish: bool) -> None:
     assert abs(np.trace(U.conj().T @ HADAMARD)) / 2 == pytest.approx(1, abs=1e-6)
 
 
+def test_objects_of_two_qubits_know_their_qubits() -> None:
+    qutip = pytest.importorskip("qutip")
+    cnot = np.eye(4)[[0, 1, 3, 2]]
+    options = {"drift": {"ZZ": 1}, "bounds": 4, "pieces": 30, "objective": "none", "equation": "right"}
+    plan = lc.steer(lc.pauli(2), lc.UpToPhase(cnot), ("XI", "YI", "IX", "IY"), 6.0, **options)
+    H, times = lc.qutip_evolution(plan)
+    start = qutip.tensor(qutip.basis(2, 1), qutip.basis(2, 0))
+    end = qutip.sesolve(H, start, times, options={"atol": 1e-11, "rtol": 1e-11, "nsteps": 100_000}).states[-1]
+    assert end.dims == start.dims
+    assert abs(end.overlap(qutip.tensor(qutip.basis(2, 1), qutip.basis(2, 1)))) == pytest.approx(1, abs=1e-7)
+    assert H.dims == [[2, 2], [2, 2]]
+
+
 @pytest.mark.parametrize(
     ("controls", "options"),
     [
