@@ -16,6 +16,10 @@ enum { LANES = 8, ORDERS = 4, MOST_NODES = 12, AFRESH = 64 };
 typedef double V __attribute__((vector_size(8 * LANES)));
 typedef long long I __attribute__((vector_size(8 * LANES)));
 
+/* Degrees of the series of exp in magnus_move.h: what they leave out is some 1e-17 for each unit of |Omega|. */
+#define POWERS(size) ((size) <= 0.0044 ? 1 : (size) <= 0.09 ? 2 : (size) <= 0.36 ? 3 : (size) <= 0.85 ? 4 : 5)
+#define DEGREE(size) ((size) <= 0.006 ? 6 : (size) <= 0.07 ? 9 : (size) <= 0.24 ? 12 : (size) <= 0.56 ? 15 : 18)
+
 #define EACH(k, n) for (int k = 0; k < (n); ++k)
 
 static inline V splat(double x)

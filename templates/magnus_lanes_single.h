@@ -17,6 +17,10 @@ enum { LANES = 16, ORDERS = 4, AFRESH = 8 };
 typedef float V __attribute__((vector_size(4 * LANES)));
 typedef int I __attribute__((vector_size(4 * LANES)));
 
+/* Degrees of the series of exp in magnus_move.h: what they leave out is some 1e-8 for each unit of |Omega|. */
+#define POWERS(size) ((size) <= 0.13f ? 1 : (size) <= 0.71f ? 2 : 3)
+#define DEGREE(size) ((size) <= 0.24f ? 6 : (size) <= 0.71f ? 9 : 12)
+
 #define EACH(k, n) for (int k = 0; k < (n); ++k)
 
 static inline V splat(float x)

@@ -56,8 +56,7 @@ static double halve(V *A, double most, int *halvings)
  */
 static void exponential_less_one(V *A, double size, V *d)
 {
-    /* size^(4 m + 2) / (4 m + 2)! below 1e-17 */
-    const int m = size <= 0.0044 ? 1 : size <= 0.09 ? 2 : size <= 0.36 ? 3 : size <= 0.85 ? 4 : 5;
+    const int m = POWERS(size);
     const double *const even = inverse_factorial, *const odd = inverse_factorial + 1;
     enum { ROOM = MATRIX + APART };
     V power[6][ROOM], cosh[ROOM], sinh[ROOM], high[ROOM];
@@ -98,8 +97,7 @@ static void exponential_less_one(V *A, double size, V *d)
 static void exponential_less_one(V *A, double size, V *d)
 {
     V square[MATRIX], cube[MATRIX], next[MATRIX];
-    /* size^degree / (degree + 1)! below 1e-17 */
-    const int degree = size <= 0.006 ? 6 : size <= 0.07 ? 9 : size <= 0.24 ? 12 : size <= 0.56 ? 15 : 18;
+    const int degree = DEGREE(size);
     multiply(A, A, square);
     multiply(square, A, cube);
     EACH(k, MATRIX) {
