@@ -71,7 +71,7 @@ def parts(scale: int, home: Path) -> dict[str, Part]:
     found["calls of six kinds without growth of memory"] = lambda: growth.calls(1_000_000 * scale)
     found["planted and tampered files of the cache"] = lambda: faults.planted(home / "planted")
     found["cells of the matrix: packages by compilers, targets, sanitizers, analysers; plain C"] = lambda: matrix.hunt(
-        home / "matrix"
+        home / "matrix", tell=sys.stdout.write
     )
     return found
 

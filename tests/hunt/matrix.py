@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -245,29 +246,28 @@ def results(
                 yield (cell_name, name, *tried(package, cell))
 
 
-def hunt(folder: Path, packages: tuple[str, ...] = tuple(PACKAGES), only: str = "") -> tuple[int, list[str]]:
-    """(cells, those that failed), with the plain C."""
-    found = [(f"{cell}, {name}", wrong) for cell, name, _, wrong in results(folder, packages, only)]
-    if not only:
-        found += [(f"{tool} of {file}", wrong) for file, tool, wrong in plain_c()]
-    return len(found), [f"{what}: {wrong}" for what, wrong in found if wrong]
+def hunt(
+    folder: Path, packages: tuple[str, ...] = tuple(PACKAGES), only: str = "", tell: Callable[[str], Any] | None = None
+) -> tuple[int, list[str]]:
+    """(cells, those that failed), with the plain C; the table is told as it grows."""
+    say = tell or (lambda text: None)
+    say(f"| | {' | '.join(packages)} |\n|---|{'---|' * len(packages)}")
+    tried, row, failed = 0, "", []
+    for cell, name, words, wrong in results(folder, packages, only):
+        begun = "" if cell == row else f"\n| {cell} |"
+        say(f"{begun} {words} |")
+        tried, row = tried + 1, cell
+        failed += [f"{cell}, {name}: {wrong}"] if wrong else []
+    plain = [] if only else list(plain_c())
+    say(f"\nplain C of templates/: {len(plain)} runs of cppcheck and clang-tidy\n")
+    return tried + len(plain), [*failed, *(f"{tool} of {file}: {wrong}" for file, tool, wrong in plain if wrong)]
 
 
 def main() -> int:
     """Print the table."""
-    failed = []
     with tempfile.TemporaryDirectory(prefix="matrix-") as folder:
-        print(f"| | {' | '.join(PACKAGES)} |\n|---|{'---|' * len(PACKAGES)}", end="")  # noqa: T201
-        row = ""
-        for cell, name, words, wrong in results(Path(folder)):
-            begun = "" if cell == row else f"\n| {cell} |"
-            print(f"{begun} {words} |", end="", flush=True)  # noqa: T201
-            row = cell
-            failed += [f"{cell}, {name}: {wrong}"] if wrong else []
-        print()  # noqa: T201
-        plain = list(plain_c())
-        failed += [f"{tool} of {file}: {wrong}" for file, tool, wrong in plain if wrong]
-        print(f"plain C of templates/: {len(plain)} runs of cppcheck and clang-tidy", *failed, sep="\n")  # noqa: T201
+        _, failed = hunt(Path(folder), tell=sys.stdout.write)
+    print(*failed, sep="\n")  # noqa: T201
     return 1 if failed else 0
 
 
