@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -146,3 +147,21 @@ def test_reeds_and_shepps_car_drives_mirrored_ways_in_the_same_time() -> None:
         for goal in ((x, y, angle), (-x, y, -angle), (x, -y, -angle))
     ]
     assert times == pytest.approx([times[0]] * 3, rel=1e-4)
+
+
+def test_a_spread_serves_a_gate_on_two_of_three_levels() -> None:
+    """Each system ends at a gate of its own on the third level, and in phases of its own."""
+    su3, gate = lc.group("su3"), np.array([[0, 1], [1, 0]])
+    spread = [{"gain": g} for g in (0.97, 1.0, 1.03)]
+    plan = lc.steer(
+        su3, lc.UpToPhase(gate, levels=(0, 1)), ("l1", "l2", "l6", "l7"), 6.0, bounds=2, spread=spread, starts=6
+    )
+    knots = np.linspace(0, 6, len(plan.u.breakpoints) + 2)
+    for number, one in enumerate(spread):
+        X = np.eye(3, dtype=complex)
+        for a, b in pairwise(knots):
+            X = X @ expm((b - a) * su3.hat(one["gain"] * plan.u((a + b) / 2)))
+        off = 1 - abs(np.trace(gate.T @ X[:2, :2])) ** 2 / 4
+        assert off < 1e-4
+        assert off == pytest.approx(plan.details["infidelities"][number], abs=1e-9)
+    assert plan.details["worst_infidelity"] < 1e-4

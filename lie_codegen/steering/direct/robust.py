@@ -24,6 +24,7 @@ from lie_codegen.steering.direct.polish import Flown, as_inputs
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme
 from lie_codegen.steering.direct.report import error_at, fidelity, plan_of
 from lie_codegen.steering.direct.starts import starts as first_controls
+from lie_codegen.steering.direct.starts import with_free_slots
 from lie_codegen.steering.direct.system import Velocity, velocity
 from lie_codegen.steering.plan import Plan, Status
 
@@ -41,17 +42,51 @@ class _Copies:
     solver: Machine
     goal: Goal
 
-    def linearised(self, u: Array) -> tuple[Array, Array, Array]:
-        """Sum of squared residuals (L,), stacked reduced residuals (L, C n) and derivatives (L, C n, S m) of u (L, S, m)."""
-        lanes, copies = len(u), len(self.tasks)
+    @property
+    def own(self) -> slice:
+        """The slots of the controls; the others are motions that the goal leaves free."""
+        before, after = self.tasks[0].free_slots
+        return slice(before, len(self.programme.low) - after)
+
+    @property
+    def free(self) -> int:
+        """How many free motions' numbers each system has."""
+        return sum(self.tasks[0].free_slots) * self.tasks[0].controls
+
+    def lanes(self, u: Array) -> Array:
+        """Unknowns (L, C) from controls with slots for free motions (L, S, m): the controls, then the free motions of each system."""
+        motions = np.delete(u, np.arange(u.shape[1])[self.own], axis=1).reshape(len(u), -1)
+        return np.concatenate([u[:, self.own].reshape(len(u), -1), np.tile(motions, (1, len(self.tasks)))], axis=1)
+
+    def each(self, x: Array) -> Array:
+        """(L, systems, S, m) what each system's programme takes, of unknowns (L, C)."""
+        lanes, copies, m = len(x), len(self.tasks), self.programme.low.shape[1]
+        width = x.shape[1] - copies * self.free
+        shared = np.repeat(x[:, None, :width], copies, axis=1).reshape(lanes, copies, -1, m)
+        motions = x[:, width:].reshape(lanes, copies, -1, m)
+        before = self.own.start
+        return np.concatenate([motions[:, :, :before], shared, motions[:, :, before:]], axis=2)
+
+    def side(self, rows: Array, beyond: float) -> Array:
+        """(C,) limits or weights of the unknowns from those of the slots (S, m), and of free motions."""
+        return np.concatenate([rows[self.own].ravel(), np.full(len(self.tasks) * self.free, beyond)])
+
+    def linearised(self, x: Array) -> tuple[Array, Array, Array]:
+        """Sum of squared residuals (L,), stacked reduced residuals (L, systems n) and derivatives (L, systems n, C) of x (L, C)."""
+        lanes, copies = len(x), len(self.tasks)
         programme = replace(self.programme, entry=np.tile(self.programme.entry, (lanes, 1)))
         goal = replace(self.goal, value=np.repeat(self.goal.value, lanes * copies, axis=0))
-        size, r, J = self.solver.linearise(programme, goal, np.repeat(u, copies, axis=0))
+        u = self.each(x)
+        size, r, J = self.solver.linearise(programme, goal, u.reshape(lanes * copies, *u.shape[2:]))
         n = r.shape[1]
+        slopes = J.reshape(lanes, copies, n, *u.shape[2:])
+        shared = slopes[..., self.own, :].reshape(lanes, copies * n, -1)
+        motions = np.delete(slopes, np.arange(u.shape[2])[self.own], axis=3).reshape(lanes, copies, n, -1)
+        alone = np.einsum("lcnf,cd->lcndf", motions, np.eye(copies)).reshape(lanes, copies * n, -1)
         return (
             np.sum(size.reshape(lanes, copies) ** 2, axis=1),
             r.reshape(lanes, copies * n),
-            J.reshape(lanes, copies * n, -1),
+            np.concatenate([shared, alone], axis=2),
         )
 
 
@@ -78,27 +113,27 @@ def robust(
         raise SteeringInputError(
             f"steer({task.system.group.name}): spread is empty; give at least one {{'drift': ..., 'gain': ...}}"
         )
-    if len(task.end.before) or len(task.end.after):
-        raise SteeringInputError(
-            f"steer({task.system.group.name}): spread takes an element, or what is up to a phase, not a Coset"
-        )
     solver = machine(task.system.group, task.controls)
     found: list[tuple[float, Array, int]] = []
+    spreads: list[_Copies] = []
     each = max(1, starts // len(task.end.values))
     for variant in range(len(task.end.values)):
         u = first_controls(task, pieces, each, seed, variant)
         if guesses is not None:
             u = np.concatenate([guesses, u])
         copies = _copies(tasks, solver, pieces, variant)
-        lanes, total = _minimised(copies, u, iterations)
+        spreads.append(copies)
+        lanes, total = _minimised(copies, copies.lanes(with_free_slots(task, u, seed)), iterations)
         best = int(np.argmin(total))
         say(f"variant {variant + 1}: sum of squared residuals {total[best]:.3g}, the best of {len(u)} starts")
         found.append((float(total[best]), lanes[best], variant))
-    total_best, u, variant = min(found, key=lambda item: item[0])
-    inputs = as_inputs(task, u, False)
-    flights = [_flown(one, inputs, variant) for one in tasks]
+    total_best, x, variant = min(found, key=lambda item: item[0])
+    systems = spreads[variant].each(x[None])[0]
+    inputs = as_inputs(task, systems[0], False)
+    flights = [_flown(one, inputs, u, variant) for one, u in zip(tasks, systems, strict=True)]
     errors = np.array([error_at(one, flight, variant) for one, flight in zip(tasks, flights, strict=True)])
-    nominal = _flown(task, inputs, variant)
+    # the system as given has no free motion of its own: that of the systems which suits it best
+    nominal = min((_flown(task, inputs, u, variant) for u in systems), key=lambda flight: flight.miss)
     fidelities = [fidelity(one, flight.X, variant) for one, flight in zip(tasks, flights, strict=True)]
     details: dict[str, Any] = {
         "winner": "direct, a spread of systems under the same controls",
@@ -185,14 +220,14 @@ def _copies(tasks: tuple[Manoeuvre, ...], solver: Machine, pieces: int, variant:
     return _Copies(tasks, whole, solver, tasks[0].goal(np.array([variant])))
 
 
-def _minimised(copies: _Copies, u: Array, iterations: int) -> tuple[Array, Array]:
-    """Controls (L, S, m) of least squared residuals and energy together, and the sum of squared residuals, lane by lane."""
-    lanes, shape = len(u), u.shape[1:]
-    low, high = copies.programme.low.ravel(), copies.programme.high.ravel()
-    energy = _ENERGY * len(copies.tasks) / low.size * copies.programme.weight.ravel()
-    x = u.reshape(lanes, -1)
+def _minimised(copies: _Copies, x: Array, iterations: int) -> tuple[Array, Array]:
+    """Unknowns (L, C) of least squared residuals and energy together, and the sum of squared residuals, lane by lane."""
+    lanes = len(x)
+    programme = copies.programme
+    low, high = copies.side(programme.low, -np.inf), copies.side(programme.high, np.inf)
+    energy = _ENERGY * len(copies.tasks) / low.size * copies.side(programme.weight, 0.0)
     damped = np.full(lanes, 1e-2)
-    total, r, J = copies.linearised(x.reshape(lanes, *shape))
+    total, r, J = copies.linearised(x)
     value = total + x**2 @ energy
     quiet = np.zeros(lanes, int)
     for _ in range(iterations):
@@ -200,7 +235,7 @@ def _minimised(copies: _Copies, u: Array, iterations: int) -> tuple[Array, Array
         if not len(act):
             break
         trial = np.clip(x[act] + _step(x[act], r[act], J[act], energy, damped[act], low, high), low, high)
-        new_total, new_r, new_J = copies.linearised(trial.reshape(len(act), *shape))
+        new_total, new_r, new_J = copies.linearised(trial)
         new = new_total + trial**2 @ energy
         better = new < value[act]
         small = better & (value[act] - new <= _STILL * value[act])
@@ -214,7 +249,7 @@ def _minimised(copies: _Copies, u: Array, iterations: int) -> tuple[Array, Array
             new_J[better],
             new[better],
         )
-    return x.reshape(lanes, *shape), total
+    return x, total
 
 
 def _step(x: Array, r: Array, J: Array, energy: Array, damped: Array, low: Array, high: Array) -> Array:
@@ -231,8 +266,8 @@ def _step(x: Array, r: Array, J: Array, energy: Array, damped: Array, low: Array
     return np.asarray(-(first - np.einsum("lqc,lq->lc", scaled, y)))
 
 
-def _flown(task: Manoeuvre, inputs: Inputs, variant: int) -> Flown:
+def _flown(task: Manoeuvre, inputs: Inputs, u: Array, variant: int) -> Flown:
     X = end_reached(Drive(task.system, inputs))
-    eye = np.eye(task.system.group.degree)
-    miss = task.end.left @ X @ task.end.right - task.end.values[variant]
-    return Flown(inputs, X, float(np.linalg.norm(miss)), (eye, eye))
+    left, right = task.free_motions(u)
+    miss = task.end.left @ left @ X @ right @ task.end.right - task.end.values[variant]
+    return Flown(inputs, X, float(np.linalg.norm(miss)), (left, right))
