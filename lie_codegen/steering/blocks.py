@@ -23,6 +23,9 @@ class Box(Saved):
         center: (2,) or (3,).
         half_sizes: half of its edges, all positive, in the unit of the positions.
         axes: (2, 2) or (3, 3) rotation, the directions of the edges in its columns; those of space if not given.
+
+    Raises:
+        SteeringInputError: a center, sizes or axes that are none.
     """
 
     center: tuple[float, ...]
@@ -52,7 +55,14 @@ class Box(Saved):
         return _one(self.center, axes, self.half_sizes, 0.0, False)
 
     def clearance(self, X: Array) -> Array:
-        """Distance of the position to the surface, (k,): negative inside."""
+        """Distance of the position to the surface, (k,): negative inside.
+
+        Args:
+            X: (k, d, d) elements with positions.
+
+        Raises:
+            ArgumentError: positions of another dimension.
+        """
         return _clearance(self.solid(), X)
 
 
@@ -64,6 +74,9 @@ class Cylinder(Saved):
         start, end: (2,) or (3,), the middles of its flat ends, or of the half balls that close a rounded one.
         radius: in the unit of the positions; half the width in the plane.
         rounded: whether half balls close it, beyond start and end.
+
+    Raises:
+        SteeringInputError: points that are none or the same, a radius that is not positive.
     """
 
     start: tuple[float, ...]
@@ -103,7 +116,14 @@ class Cylinder(Saved):
         return _one((start + end) / 2, axes, halves, self.radius * self.rounded, q == 3 and not self.rounded)
 
     def clearance(self, X: Array) -> Array:
-        """Distance of the position to the surface, (k,): negative inside."""
+        """Distance of the position to the surface, (k,): negative inside.
+
+        Args:
+            X: (k, d, d) elements with positions.
+
+        Raises:
+            ArgumentError: positions of another dimension.
+        """
         return _clearance(self.solid(), X)
 
 
