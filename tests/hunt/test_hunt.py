@@ -101,9 +101,12 @@ def test_a_write_that_fails_leaves_the_old_or_the_new() -> None:
 @pytest.mark.skipif(not matrix.compilers(), reason="neither gcc nor clang")
 def test_generated_c_has_no_warning_to_give_and_meets_its_vectors(tmp_path: Path) -> None:
     compiler = matrix.compilers()[0]
-    tried, found = matrix.hunt(tmp_path, ("so3", "so3 float", "steering"), only=compiler)
-    assert tried == 9
-    assert not found, "\n".join(found)
+    cells = 0
+    for packages, only in ((("so3", "so3 float"), compiler), (("steering",), f"{compiler}, one lane")):
+        tried, found = matrix.hunt(tmp_path, packages, only)
+        cells += tried
+        assert not found, "\n".join(found)
+    assert cells == 7
 
 
 @pytest.mark.slow
