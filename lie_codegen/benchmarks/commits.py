@@ -25,6 +25,8 @@ _ROOT = Path(__file__).parents[2]
 _ROWS = Path(__file__).with_name("commit_rows.py")
 #: Pairs of processes; seconds that are timed at once; a row slower by more than this in every pair is said, a cost higher by more too.
 PAIRS, _LEAST, SLOWER, _DEARER = 3, 4e-3, 1.05, 1e-3
+#: After so many measurements of each side a row that has taken so many seconds is done.
+_FEWEST, _PATIENCE = 6, 2.0
 
 
 @dataclass(frozen=True)
@@ -159,13 +161,16 @@ def _duel(name: str, sides: Sequence[_Side], rounds: int) -> CommitRow:
         if "absent" in answer:
             return CommitRow(name, note=f"{who}: {answer['absent']}")
     count = max(1, min(10_000, int(_LEAST / max(1e-9, min(answer["seconds"] for answer in first)))))
-    least, costs = [float("inf")] * 2, [answer["cost"] for answer in first]
+    least, costs, spent = [float("inf")] * 2, [answer["cost"] for answer in first], 0.0
     for number in range(2 * rounds):
+        if number >= _FEWEST and spent > _PATIENCE:
+            break
         for which in (0, 1) if number % 2 == 0 else (1, 0):
             answer = sides[which].ask(name, count)
             if "absent" in answer:
                 return CommitRow(name, note=answer["absent"])
             least[which], costs[which] = min(least[which], answer["seconds"]), answer["cost"]
+            spent += count * answer["seconds"]
     return CommitRow(name, least[0], least[1], (least[0] / least[1],), costs[0], costs[1])
 
 
