@@ -6,6 +6,7 @@ X_i' = X_i hat(xi_i(t, X, v)),   v' = a(t, X, v);   within a step X_i = X_i0 exp
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -55,6 +56,7 @@ def rotation_rate(group: MatrixGroup) -> float | None:
     return float(c[0, 1, 2]) if c[0, 1, 2] != 0 and np.array_equal(c, turn) else None
 
 
+@lru_cache(maxsize=256)
 def reach_of(group: MatrixGroup, *, closed: bool) -> float:
     """|Theta| up to which the series above and the exponential hold.
 

@@ -30,9 +30,15 @@ FAMILY_EXAMPLES = ("r4", "so5", "so22", "se4", "se_3_3", "su4", "sl4", "gl3", "s
 
 
 @cache
+def _catalogue() -> dict[str, Path]:
+    """The files of the catalogue by name, sorted."""
+    return {path.stem: path for path in sorted(_FOLDER.glob("*.toml"), key=lambda path: path.stem)}
+
+
+@cache
 def group_names() -> tuple[str, ...]:
     """The names in the catalogue, sorted; families (so5, su4, ...) are made on demand and not listed."""
-    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+    return tuple(_catalogue())
 
 
 def plain_name(name_or_path: str | Path) -> str:
@@ -69,8 +75,8 @@ def group_path(name_or_path: str | Path) -> Path:
     text = plain_name(name_or_path)
     if text == STANDARD_INPUT:
         return Path("standard input")
-    if text in group_names():
-        return _FOLDER / f"{text}.toml"
+    if text in _catalogue():
+        return _catalogue()[text]
     path = Path(name_or_path)
     if path.suffix == ".toml":
         return path
@@ -88,6 +94,12 @@ def _standard_input() -> bytes:
     return sys.stdin.buffer.read()
 
 
+@cache
+def _catalogue_file(name: str) -> bytes:
+    """A file of the catalogue, which is a part of the package and read once, as its code is."""
+    return _catalogue()[name].read_bytes()
+
+
 def definition_source(name_or_path: str | Path) -> bytes:
     """What determines the group: the bytes of its file, or the name of a member of a family.
 
@@ -97,10 +109,13 @@ def definition_source(name_or_path: str | Path) -> bytes:
     """
     if str(name_or_path) == STANDARD_INPUT:
         return _standard_input()
+    name = plain_name(name_or_path)
     if is_generated(name_or_path):
-        return f"family {plain_name(name_or_path)}".encode()
+        return f"family {name}".encode()
     path = group_path(name_or_path)
     try:
+        if name in _catalogue():
+            return _catalogue_file(name)
         # A pipe or a device may never end: only files are read.
         if path.exists() and not path.is_file():
             raise GroupFileError(f"{path}: cannot be read: it is not a file; a piped group file is named '-'")

@@ -16,6 +16,9 @@ from lie_codegen.errors import InputError
 
 Factory = TypeVar("Factory", bound=Callable[..., Any])
 
+#: Made once: an encoder a text would be a third of the time that a text takes.
+_CANONICAL = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+
 
 class NoDefinitionError(TypeError):
     """A value that is no plain data and has no definition, as a function written by the user."""
@@ -30,7 +33,7 @@ class Definition(dict[str, Any]):
     @functools.cached_property
     def text(self) -> str:
         """Canonical JSON: equal definitions have equal texts."""
-        return json.dumps(self, sort_keys=True, separators=(",", ":"))
+        return _CANONICAL.encode(self)
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError("a definition cannot be changed; make another thing")
