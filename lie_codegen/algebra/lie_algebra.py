@@ -14,6 +14,7 @@ from lie_codegen.errors import AlgebraError, InputError, JacobiError
 from lie_codegen.exact.numbers import Number, exact_number, field_elements
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.values import brief
 
 #: Sparse vector: basis index -> coefficient, no zeros.
 Sparse = Mapping[int, Number]
@@ -37,6 +38,10 @@ class LieAlgebra:
     name: str
     labels: tuple[str, ...]
     table: Mapping[tuple[int, int], Sparse]
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<algebra {self.name}: {self.dim} dimensions, basis {brief(self.labels)}>"
 
     def __post_init__(self) -> None:
         check_identifier(self.name, "name")

@@ -23,6 +23,7 @@ from lie_codegen.kernel.definition import definition_of
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.on_demand import sympy as sp
+from lie_codegen.values import brief
 
 #: Where the kernels of a group are made, above this file: named here and loaded when `group.casadi` is asked.
 KERNELS, STEP = "lie_codegen.groups.kernels", "lie_codegen.groups.maps.rkmk"
@@ -44,6 +45,11 @@ class MatrixGroup:
     exact_basis: tuple[sp.ImmutableMatrix, ...]
     units: tuple[str, ...]
     description: str = field(default="", compare=False)
+
+    def __repr__(self) -> str:
+        """In one line; whole matrices and constants of 63 dimensions are 50 kB."""
+        kind = "complex" if self.is_complex else "real"
+        return f"<group {self.name}: {self.dim} dimensions, {self.degree} x {self.degree} {kind} matrices, basis {brief(self.labels)}>"
 
     @property
     def name(self) -> str:

@@ -33,6 +33,14 @@ def test_the_catalogue_holds_what_it_promises() -> None:
     assert {name: lc.group(name).labels for name in LABELS} == LABELS
 
 
+@pytest.mark.parametrize("name", ["so3", "su6"])
+def test_a_group_and_its_algebra_print_in_a_line(name: str) -> None:
+    group = lc.group(name)
+    for printed in (repr(group), repr(group.algebra)):
+        assert name in printed
+        assert len(printed) < 160
+
+
 @pytest.mark.parametrize("name", [*group_names(), *FAMILY_EXAMPLES])
 def test_commutators_follow_the_structure_constants(name: str) -> None:
     group = lc.group(name)

@@ -94,6 +94,8 @@ SAVED: dict[str, Callable[[], Any]] = {
     "Allocation": lambda: lc.allocate(np.eye(3, 4) + 0.1),
     "AttitudeRegion": lambda: lc.attitude_region([0.4, 0, 0.1], [0.1, 0.2, 0.3], inertia=[1, 2, 3], k_p=2),
     "Ball": lambda: lc.Ball([0, 0, 1], 0.5),
+    "Box": lambda: lc.Box([0, 0, 1], [0.5, 0.2, 0.1]),
+    "Cylinder": lambda: lc.Cylinder([0, 0, 0], [0, 0, 1], 0.1, rounded=True),
     "BoundCheck": lambda: lc.corollary_check("so3", wave(), 1, eps=(0.2, 0.1), horizon=0.5),
     "BracketTerm": lambda: lc.bracket_table(lc.PeriodicInput(["cos(t)"]))[0],
     "CartanInvolution": lambda: lc.cartan_involution("sl2"),
@@ -181,6 +183,7 @@ def test_a_result_is_a_value(name: str, tmp_path: Path, elsewhere: Callable[[Any
     assert hash(value) == hash(twin)
     assert len(repr(value).splitlines()) <= 10
     assert "array(" not in repr(value)
+    assert len(repr(value)) <= 1200
     twins = (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value), replace(value))
     for again in (*twins, *elsewhere(value)):
         assert (again == value) is True

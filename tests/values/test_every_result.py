@@ -117,6 +117,7 @@ def test_a_result_is_a_value(name: str, tmp_path: Path, elsewhere: Callable[[Any
     assert hash(value) == hash(make())
     assert len(repr(value).splitlines()) <= 10
     assert "array(" not in repr(value)
+    assert len(repr(value)) <= 1200
     for twin in (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value), *elsewhere(value)):
         assert (twin == value) is True
     if name in SAVED:
