@@ -16,18 +16,21 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.mechanics.actuators import MomentumWheels, PointMassOscillator
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 
 
-def wheel_input(wheels: MomentumWheels, wheel_rates: PeriodicInput) -> PeriodicInput:
+def wheel_input(wheels: MomentumWheels, wheel_rates: PeriodicLike) -> PeriodicInput:
     """u = C theta', TR 93-59, (69): the body rate of wheel rates theta' (p components), exactly.
 
     Args:
         wheels: a body with p momentum wheels.
-        wheel_rates: theta', p components. [rad/s]
+        wheel_rates: theta', p components, or a list of their formulas. [rad/s]
 
     Raises:
         ShapeError: if there are not p components.
+        InputError: wheel_rates is no `PeriodicInput`, nor formulas of one.
     """
+    wheel_rates = as_periodic(wheel_rates, "wheel_input")
     if wheel_rates.dim != wheels.count:
         raise ShapeError(f"wheel_input: {wheel_rates.dim} wheel rates for {wheels.count} wheels")
     return wheel_rates.linear(wheels.exact_C)

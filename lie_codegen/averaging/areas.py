@@ -13,21 +13,22 @@ from itertools import combinations
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 
 
-def areas(u: PeriodicInput) -> sp.ImmutableMatrix:
+def areas(u: PeriodicLike) -> sp.ImmutableMatrix:
     """Area_ij = 1/2 int_0^T (ut_i u_j - ut_j u_i) dt, ut = int_0^t u: the area of the loop, projected on the plane (i, j); TR 93-59, (21).
 
     Args:
-        u: n components of period T.
+        u: n components of period T, or a list of their formulas.
 
     Returns:
         (n, n), antisymmetric; exact where the input is. [u unit^2 time unit^2]
 
     Raises:
-        ArgumentError: u is no `PeriodicInput`.
+        InputError: u is no `PeriodicInput`, nor formulas of one.
     """
+    u = as_periodic(u, "areas")
     n = u.dim
     pairs = list(combinations(range(n), 2))
     brackets = {pair: {n + p: sp.S.One} for p, pair in enumerate(pairs)}
@@ -42,18 +43,19 @@ def areas(u: PeriodicInput) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix(matrix)
 
 
-def moments(u: PeriodicInput) -> sp.ImmutableDenseNDimArray:
+def moments(u: PeriodicLike) -> sp.ImmutableDenseNDimArray:
     """m_ijk = 1/3 int_0^T (ut_i u_j - ut_j u_i) ut_k dt, ut = int_0^t u: the first moments of the areas, of the third-order rate (area-moment rule).
 
     Args:
-        u: n components of period T.
+        u: n components of period T, or a list of their formulas.
 
     Returns:
         (n, n, n), antisymmetric in i and j; exact where the input is. [u unit^3 time unit^3]
 
     Raises:
-        ArgumentError: u is no `PeriodicInput`.
+        InputError: u is no `PeriodicInput`, nor formulas of one.
     """
+    u = as_periodic(u, "moments")
     n = u.dim
     pairs = list(combinations(range(n), 2))
     dim = n + len(pairs)

@@ -25,6 +25,7 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import floquet_magnus
 from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 from lie_codegen.signals.time_series import expressions_of, functions_of
 
 #: form -> the orders it has.
@@ -201,13 +202,13 @@ class Averaged(Saved):
 
 
 def average(
-    group: GroupLike, u: PeriodicInput, order: int = 2, form: str = "floquet", *, X0: ArrayLike | None = None
+    group: GroupLike, u: PeriodicLike, order: int = 2, form: str = "floquet", *, X0: ArrayLike | None = None
 ) -> Averaged:
     """Average X' = eps X hat(u(t)), X(0) = X0, with error O(eps^order) on [0, b / eps].
 
     Args:
         group: the group.
-        u: n components, one for each basis element.
+        u: n components, one for each basis element: a `PeriodicInput`, or a list of formulas of t.
         order: p; "product" has 1 and 2, "single" 1 to 3, "floquet" any.
         form: "floquet" (any mean), "product" (Theorem 3) or "single" (Theorem 4; both need u_av = 0 from order 2).
         X0: (d, d) initial element, the identity if not given; by left invariance it multiplies from the left.
@@ -217,9 +218,7 @@ def average(
         InputError: no such form or order.
         ShapeError: if u has not n components.
     """
-    group = as_group(group, "average")
-    if not isinstance(u, PeriodicInput):
-        raise InputError(f"average: u is {type(u).__name__}; make it a PeriodicInput")
+    group, u = as_group(group, "average"), as_periodic(u, "average")
     if u.dim != group.dim:
         raise ShapeError(f"average: u has {u.dim} components, {group.name} has {group.dim}: {', '.join(group.labels)}")
     _check_form(form, order)

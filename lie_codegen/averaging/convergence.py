@@ -22,7 +22,7 @@ from lie_codegen.algebra.brackets import ad
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 
 _PANELS = 64
 
@@ -50,18 +50,18 @@ class Convergence(Saved):
     statement: str
 
 
-def convergence(group: GroupLike, u: PeriodicInput, eps: float) -> Convergence:
+def convergence(group: GroupLike, u: PeriodicLike, eps: float) -> Convergence:
     """The convergence conditions of the Magnus series of X' = eps X hat(u).
 
     Args:
         group: object, catalogue name or file.
-        u: n components, over one period.
+        u: n components, over one period, or a list of their formulas.
         eps: the small parameter, positive.
 
     Raises:
-        InputError: if eps is not positive and finite.
+        InputError: eps is not positive and finite; u is no `PeriodicInput`, nor formulas of one.
     """
-    group = as_group(group, "convergence")
+    group, u = as_group(group, "convergence"), as_periodic(u, "convergence")
     if not 0 < eps < np.inf:
         raise InputError(f"convergence: eps must be positive, got {eps}")
     x, w = leggauss(8)

@@ -20,7 +20,7 @@ from lie_codegen.flow.attitude_metrics import distances, rotation_angle
 from lie_codegen.flow.reference_flow import reference_flow
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 
 
 def corollary_bound(delta: ArrayLike) -> NDArray[np.float64]:
@@ -64,7 +64,7 @@ class BoundCheck(Saved):
 
 def corollary_check(
     group: GroupLike,
-    u: PeriodicInput,
+    u: PeriodicLike,
     order: int,
     *,
     eps: Sequence[float] = (0.2, 0.1, 0.05),
@@ -74,7 +74,7 @@ def corollary_check(
 
     Args:
         group: so3, or a group with its definition.
-        u: three components, periodic.
+        u: three components, periodic, or a list of their formulas.
         order: 1 or 2, of the average.
         eps: scales, each of which is simulated.
         horizon: of eps t. [time unit]
@@ -84,7 +84,7 @@ def corollary_check(
         AssumptionError: order 2 of an input with a mean.
         ChartError: if the coordinates leave |g_2| < pi / 2, where the corollaries say nothing.
     """
-    group = as_group(group, "corollary_check")
+    group, u = as_group(group, "corollary_check"), as_periodic(u, "corollary_check")
     eps = checked_scales("corollary_check", float(u.period), eps, horizon)
     averaged = average(group, u, order, "product")
     coordinates, angles, norms = [], [], []

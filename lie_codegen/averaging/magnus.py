@@ -28,6 +28,7 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import bernoulli
 from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 from lie_codegen.signals.time_series import expressions_of, functions_of
 
 _MOST = 12
@@ -84,21 +85,21 @@ class Magnus(Saved):
         return expm(self.group.hat(self.exponent(eps, t)))
 
 
-def magnus(group: GroupLike, u: PeriodicInput, order: int) -> Magnus:
+def magnus(group: GroupLike, u: PeriodicLike, order: int) -> Magnus:
     """The Magnus series to a given order.
 
     It converges for t up to a limit only: see `convergence`. For times of order 1 / eps use `average`.
 
     Args:
         group: object, catalogue name or file.
-        u: n components, sums of sines and cosines.
+        u: n components, sums of sines and cosines, or a list of their formulas.
         order: 1 to 12, the power of eps of the last term.
 
     Raises:
         InputError: an order that is not 1 to 12, or a sampled input (its secular terms are not periodic).
         ShapeError: if u has not n components.
     """
-    group = as_group(group, "magnus")
+    group, u = as_group(group, "magnus"), as_periodic(u, "magnus")
     if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= _MOST:
         raise InputError(f"magnus: order must be an integer from 1 to {_MOST}, got {order!r}")
     if u.dim != group.dim:

@@ -19,6 +19,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 
 #: state(eps, t) -> (k, d, d)
 State = Callable[[float, Array], Array]
@@ -82,7 +83,7 @@ class OrderCheck(Saved):
 
 def order_check(
     group: GroupLike,
-    u: PeriodicInput,
+    u: PeriodicLike,
     order: int = 2,
     form: str = "floquet",
     *,
@@ -102,7 +103,7 @@ def order_check(
         InputError: bad eps, horizon or metric; AssumptionError as `average`.
         ChartError: the coordinates of the metric reach the edge of their chart.
     """
-    group = as_group(group, "order_check")
+    group, u = as_group(group, "order_check"), as_periodic(u, "order_check")
     values = different_scales("order_check", float(u.period), eps, horizon)
     if metric not in METRICS:
         raise InputError(f"order_check: no metric {metric!r}; choose one of {', '.join(METRICS)}")

@@ -12,6 +12,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.identifiers import shown
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 from lie_codegen.signals.resolved_input import resolve_function
 
@@ -136,6 +137,5 @@ def _numbers(group: MatrixGroup, value: Any, what: str) -> Array:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"simulate({group.name}): {what} must be real numbers, got {value!r}; formulas go through lc.PeriodicInput, "
-            "or a function of t"
+            f"simulate({group.name}): {what} must be real numbers, formulas of t or a function of t, got {shown(value)}"
         ) from None

@@ -28,7 +28,7 @@ from lie_codegen.flow.magnus.solver import LONG, REACHED, WaveRuns
 from lie_codegen.flow.magnus.tangents import tangents
 from lie_codegen.flow.parametric_drive import parametric_batch, parametric_drive, wave_numbers
 from lie_codegen.flow.propagation import Power, PropagationBatch, power_of
-from lie_codegen.flow.simulate_arguments import check_precision, check_tolerance
+from lie_codegen.flow.simulate_arguments import check_precision, check_tolerance, written
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
@@ -288,7 +288,7 @@ def propagator(
 
     Args:
         group: a group, a catalogue name or a group file.
-        u: a lc.ParametricInput; or any input of `simulate`, without parameters.
+        u: a lc.ParametricInput; or an input of time of `simulate` (formulas, samples, a constant, a function), without parameters.
         duration: T, or "period" of a periodic input.
         rtol: as in `simulate`.
         resolution: as in `simulate`, for a u that is no sum of sines and cosines.
@@ -296,10 +296,15 @@ def propagator(
     Raises:
         InputError: a duration that is not positive, or "period" of an input that is not periodic.
         ShapeError: u has not one component for each basis element.
+        NotFiniteError: u holds NaN or infinity.
+        ExpressionError: a formula outside the grammar; one of parameters goes into a lc.ParametricInput.
     """
     G = as_group(group, "propagator")
     where = f"propagator({G.name})"
     goal = check_tolerance(where, rtol, 0.0, None)
+    u = written(u)
+    if isinstance(u, tuple) and isinstance(u[0], str):
+        u = ParametricInput(u, ())
     if isinstance(u, ParametricInput) and u.dim != G.dim:
         raise ShapeError(f"{where}: u has {u.dim} components; the algebra has {G.dim}")
     if duration == "period":
@@ -309,4 +314,7 @@ def propagator(
             )
     elif isinstance(duration, str) or not (np.isfinite(duration) and duration > 0):
         raise InputError(f'{where}: duration is {duration!r}; give a positive number, or "period"')
+    if not isinstance(u, ParametricInput):
+        end = float(u.T) if duration == "period" else float(duration)
+        as_signal(G, u, np.array([0.0, end]))  # what is no input is refused here, not when it is run
     return Propagator(G, u, duration, goal, resolution)

@@ -29,6 +29,7 @@ from lie_codegen.flow.simulate_arguments import (
     initial_elements,
     input_of,
     step_count,
+    written,
 )
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
@@ -125,6 +126,7 @@ def simulate(
             f"simulate({group.name}): atol goes with steps that are chosen by it; give steps or atol, not both"
         )
     start = initial_elements(group, X0)
+    u = written(u)
     law = as_feedback(group, u)
     if law is not None:
         if single:

@@ -20,9 +20,18 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 _DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
+def written(u: Any) -> Any:
+    """Formulas, of which some may be numbers, as a tuple of texts; everything else, as a constant, stays."""
+    entries = u.tolist() if isinstance(u, np.ndarray) and u.dtype.kind in "OU" else u
+    if not isinstance(entries, list | tuple) or not any(isinstance(each, str) for each in entries):
+        return u
+    # a float by its shortest decimals: as it was written
+    return tuple(repr(float(each)) if isinstance(each, float | np.floating) else str(each) for each in entries)
+
+
 def input_of(group: MatrixGroup, u: Any) -> Any:
-    """Formulas as texts become a function of time, everything else stays."""
-    if not (isinstance(u, list | tuple) and len(u) > 0 and all(isinstance(each, str) for each in u)):
+    """What is `written` becomes a function of time, everything else stays."""
+    if not (isinstance(u, tuple) and u and isinstance(u[0], str)):
         return u
     from lie_codegen.flow.formulas import formula_input
 

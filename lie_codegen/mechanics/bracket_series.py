@@ -18,7 +18,7 @@ from lie_codegen.errors import InputError
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.floquet_magnus import floquet_magnus
-from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 from lie_codegen.signals.time_polynomial import TimePolynomial, constant, fourier_terms
 
 #: A generator by its number, or the bracket of two words.
@@ -141,7 +141,7 @@ def bracket_series(inputs: tuple[TimePolynomial, ...], order: int, gauge: str) -
     return BracketSeries(inputs, values, tuple(dict(each) for each in logarithms), U)
 
 
-def bracket_table(u: PeriodicInput, order: int = 2, gauge: str = "pull_back") -> tuple[BracketTerm, ...]:
+def bracket_table(u: PeriodicLike, order: int = 2, gauge: str = "pull_back") -> tuple[BracketTerm, ...]:
     """The averaged coefficients of all brackets, Z = sum eps^(q-1) sum coefficient * bracket, exact in the parameters of the input.
 
     Args:
@@ -152,8 +152,7 @@ def bracket_table(u: PeriodicInput, order: int = 2, gauge: str = "pull_back") ->
     Raises:
         InputError: an order or gauge there is not; a mean in the zero-mean gauge, where U would not be periodic.
     """
-    if not isinstance(u, PeriodicInput):
-        raise InputError(f"bracket_table: u is {type(u).__name__}; make it a PeriodicInput")
+    u = as_periodic(u, "bracket_table")
     waves = fourier_terms(u)
     if gauge == "zero_mean" and any(wave.mean() != 0 for wave in waves):
         raise InputError("bracket_table: an input with a mean has no primitive of zero mean; use gauge='pull_back'")

@@ -26,7 +26,7 @@ from lie_codegen.mechanics.vibrational_fields import VibrationalFields, vibratio
 from lie_codegen.mechanics.vibrational_kernels import term_kernels, vibrational_kernels
 from lie_codegen.runtime.broadcast import broadcast_call
 from lie_codegen.runtime.library import Library
-from lie_codegen.signals.periodic_input import PeriodicInput
+from lie_codegen.signals.periodic_reader import PeriodicLike, as_periodic
 
 NAMESPACE = "vibrational"
 #: Coordinates up to which brackets are symbols: beyond, and beyond order 2, they are taken by dual numbers.
@@ -196,14 +196,14 @@ class VibrationalAverage(Saved):
 
 @overload
 def vibrational_average(
-    system: MechanicalSystem, u: PeriodicInput, order: int = 2, gauge: str = "zero_mean", *, mean_to_drift: bool = False
+    system: MechanicalSystem, u: PeriodicLike, order: int = 2, gauge: str = "zero_mean", *, mean_to_drift: bool = False
 ) -> MechanicalAverage: ...
 
 
 @overload
 def vibrational_average(
     system: LagrangianSystem | RouthReduction,
-    u: PeriodicInput,
+    u: PeriodicLike,
     order: int = 2,
     gauge: str = "zero_mean",
     *,
@@ -213,7 +213,7 @@ def vibrational_average(
 
 def vibrational_average(
     system: Any,
-    u: PeriodicInput,
+    u: PeriodicLike,
     order: int = 2,
     gauge: str = "zero_mean",
     *,
@@ -233,10 +233,7 @@ def vibrational_average(
 
     Source: Sanyal, Bloch and McClamroch, (14)-(17), (22)-(24), corrected.
     """
-    if isinstance(u, list | tuple) and u and all(isinstance(each, str) for each in u):
-        u = PeriodicInput(list(u))
-    if not isinstance(u, PeriodicInput):
-        raise InputError(f"vibrational_average: u is {type(u).__name__}; make it a PeriodicInput")
+    u = as_periodic(u, "vibrational_average")
     if isinstance(system, MechanicalSystem):
         return mechanical_average(system, u, order, gauge, mean_to_drift=mean_to_drift)
     inner = system.system if isinstance(system, RouthReduction) else system

@@ -113,8 +113,8 @@ def _gain() -> Any:
 
 #: (name, error that its docstring states, what raises it).
 STATED: list[tuple[str, str, Callable[[], Any]]] = [
-    ("areas", "ArgumentError", lambda: lc.areas("x")),  # type: ignore[arg-type]
-    ("moments", "ArgumentError", lambda: lc.moments("x")),  # type: ignore[arg-type]
+    ("areas", "InputError", lambda: lc.areas("x")),
+    ("moments", "InputError", lambda: lc.moments("x")),
     ("corollary_bound", "ArgumentError", lambda: lc.corollary_bound("x")),  # type: ignore[arg-type]
     ("corollary_check", "AssumptionError", lambda: lc.corollary_check("so3", lc.PeriodicInput(["1+cos(t)", "0", "0"]), 2)),
     ("convergence", "InputError", lambda: lc.convergence("so3", _turn(), -1)),
