@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from lie_codegen.steering.direct.starts import starts as first_controls
 from lie_codegen.steering.direct.starts import with_free_slots
 from lie_codegen.steering.obstacles.homotopy import Discs, planar_discs, resampled, shortest_classes
 from lie_codegen.steering.obstacles.keep_out import KeepOut
+from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.obstacles.path_guess import word_text
 from lie_codegen.steering.obstacles.roadmap import Places, Space, drawn_into, seen, ways
 from lie_codegen.steering.obstacles.tunnels import tunnels
@@ -234,7 +235,7 @@ class Scene:
             v, _, _ = cheaper(course, v, limit)
             v, task, flown = self._confirmed(course, v, variant)
             X = self.states(flown)
-            gaps = _least(self.keep_out.gaps(X))
+            gaps = np.array([lowest(partial(self._gap, one), X) for one in range(len(self.obstacles))])
             through = tunnels(self.obstacles, X)
             clearance = -1.0 if through else float(np.min(gaps))
             way = seen(self.keep_out, X[np.linspace(0, len(X) - 1, 129).round().astype(int)])
@@ -285,7 +286,10 @@ class Scene:
     def clearances(self, flown: Flown) -> tuple[float, ...]:
         """Least of each obstacle's own clearance along the way."""
         X = self.states(flown)
-        return tuple(float(np.min(each.clearance(X))) for each in self.obstacles)
+        return tuple(lowest(each.clearance, X) for each in self.obstacles)
+
+    def _gap(self, one: int, X: Array) -> Array:
+        return np.asarray(self.keep_out.gaps(X)[..., one])
 
     def named(self, good: Sequence[Result]) -> tuple[dict[str, Any], ...]:
         """{"word", "cost", "clearance"} of the cheapest result of each class of ways, the cheapest first."""
@@ -302,15 +306,6 @@ class Scene:
                 word = f"way {same[0] + 1 if same else len(kept)}"
             best.setdefault(word, {"word": word, "cost": each.cost, "clearance": each.clearance})
         return tuple(best.values())
-
-
-def _least(gaps: Array) -> Array:
-    """(o,) least of gaps (k, o) along a way: between looks by the parabola through the lowest and its neighbours."""
-    before, here, after = gaps[:-2], gaps[1:-1], gaps[2:]
-    bend, slope = before - 2 * here + after, (after - before) / 2
-    lowest = (here <= before) & (here <= after) & (bend > 0)
-    dip = np.where(lowest, slope**2 / (2 * np.maximum(bend, 1e-300)), 0.0)
-    return np.asarray(np.minimum(np.min(here - dip, axis=0), np.minimum(gaps[0], gaps[-1])))
 
 
 def _stretched(values: Array, nodes: int) -> Array:

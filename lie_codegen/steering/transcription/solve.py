@@ -11,6 +11,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.constraints import Ball, Cone
+from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.obstacles.tunnels import tunnels
 from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.task import Task
@@ -143,7 +144,7 @@ def refined(bench: Workbench, name: str, start: Array, first_end: ProgramEnd) ->
                 solve.objective, values, duration, solve.violation, target, np.inf, motion, solution, tuple(solves)
             )
             return tunnel if best is None else replace(best, solves=tuple(solves))
-        cut = np.array([max(0.0, -float(np.min(each.clearance(motion.X)))) for each in numbers.obstacles])
+        cut = np.array([max(0.0, -lowest(each.clearance, motion.X)) for each in numbers.obstacles])
         relative = np.linalg.solve(motion.X[-1], target)
         slip = np.zeros(task.group.dim) if second is None else second.ends[1] - motion.xi[-1]
         off = float(max(np.max(np.abs(relative - np.eye(task.group.degree))), np.max(np.abs(slip))))

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.logarithm import distance
+from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.plan import Facts, Plan, Status
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.failure_report import ends_in_obstacles, failure_report
@@ -182,7 +183,7 @@ def _plan(
         "solves": tuple(solve for each in candidates for solve in each.solves),
         "objective": "time" if structure.free_time else "energy",
         "discretisation": "controls continuous and linear on each interval: the cost is an upper bound of the optimum's",
-        "clearances": tuple(float(np.min(obstacle.clearance(motion.X))) for obstacle in numbers.obstacles),
+        "clearances": tuple(lowest(obstacle.clearance, motion.X) for obstacle in numbers.obstacles),
         "control_peaks": tuple(float(x) for x in np.max(np.abs(values), axis=0)),
         "drift": numbers.drift / task.duration,
         "optimality": "a local minimum of the discretised problem, the best of the starts tried",
