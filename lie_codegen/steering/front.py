@@ -138,7 +138,7 @@ def steer(
         end_velocity: (n,) xi at the end, second order; zero.
         intervals: pieces of the controls; 64 (transcription), 60 (ocp).
         pieces: constant pieces of the first search; by the task (direct).
-        starts: first guesses tried; 16 (direct), 8 (ocp, circle, area_rule), 3 (transcription), tuned (optimal).
+        starts: first guesses tried; 16 (direct), 8 (ocp, circle, area_rule), 3 (transcription; 8 beside walls), tuned (optimal).
         rounds: rounds of starts before giving up; 4 (direct).
         iterations: iterations of a descent; 150 (direct).
         seed: of the random starts or the noise; 0 (direct, ocp, feedback).

@@ -92,7 +92,7 @@ def _check_choices(asked: Options, where: str) -> None:
         ("starts", asked.starts, 1),
         ("classes", asked.classes, 0),
     ):
-        if operator.index(value) < least:
+        if value is not None and operator.index(value) < least:
             raise SteeringInputError(f"{where}: {name} must be at least {least}, got {value}")
     if asked.objective not in ("energy", "time"):
         raise SteeringInputError(f'{where}: objective is "energy" or "time", got {asked.objective!r}')

@@ -34,7 +34,8 @@ class Options:
         start_velocity, end_velocity: (n,) xi at the ends, zero if not given.
         weights: (m,) positive w_i, ones if not given.
         intervals: N, pieces of the controls.
-        starts: first guesses tried; the cheapest admissible result wins.
+        starts: first guesses tried; the cheapest admissible result wins; if not given 8 among
+            boxes and cylinders, or in least time among any obstacles, else 3.
         solver: "auto": fatrop, and ipopt where no start of fatrop's leads anywhere; ipopt alone where the controls are periodic,
             or do not reach all without the drift or the inertia. Or "fatrop" or "ipopt".
         classes: shortest classes of ways between discs in the plane (`Ball`s on SE(2)) tried beside the other guesses, each with three
@@ -58,7 +59,7 @@ class Options:
     end_velocity: ArrayLike | None = None
     weights: ArrayLike | None = None
     intervals: int = 64
-    starts: int = 3
+    starts: int | None = None
     solver: str = "auto"
     classes: int = 4
     guess: Any = None
