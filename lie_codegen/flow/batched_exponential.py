@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from math import factorial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-_DEGREE = 17
 _RADIUS = 0.5
 _NEAR = 0.25
 _MOST_ROOTS = 40
@@ -15,17 +15,29 @@ _ROOT_STEPS = 30
 
 
 def expm(A: NDArray[Any]) -> NDArray[Any]:
-    """(..., d, d) -> (..., d, d); relative error a few ulp times the largest number of squarings."""
+    """(..., d, d) -> (..., d, d); relative error a few ulp times the largest number of squarings.
+
+    Taylor's polynomial of degree 15, of norms up to 1/2 exact to 1e-18, in four blocks of powers up to the third: six products where Horner's
+    rule takes fifteen (Paterson and Stockmeyer).
+    """
     size = float(np.max(np.sum(np.abs(A), axis=-1), initial=0.0))
     squarings = max(0, int(np.ceil(np.log2(size / _RADIUS)))) if size > _RADIUS else 0
-    scaled = A / 2.0**squarings
-    identity = np.broadcast_to(np.eye(A.shape[-1], dtype=A.dtype), A.shape)
-    result = identity
-    for k in range(_DEGREE, 0, -1):
-        result = identity + scaled @ result / k
+    first = A / 2.0**squarings
+    second = first @ first
+    powers = (np.eye(A.shape[-1], dtype=A.dtype), first, second, second @ first)
+    fourth = second @ second
+    result = _block(powers, 12)
+    for start in (8, 4, 0):
+        result = result @ fourth + _block(powers, start)
     for _ in range(squarings):
         result = result @ result
     return np.asarray(result)
+
+
+def _block(powers: tuple[NDArray[Any], ...], start: int) -> NDArray[Any]:
+    """The sum of powers[j] / (start + j)!"""
+    one, *others = (power * (1 / factorial(start + j)) for j, power in enumerate(powers))
+    return np.asarray(sum(others, one))
 
 
 def logm(X: NDArray[Any]) -> NDArray[Any]:
