@@ -13,7 +13,7 @@ from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.quantum_path import bloch_paths
 from lie_codegen.pictures.steering_loops import COLOURS, GREY
-from lie_codegen.steering.blocks import Box, Cylinder
+from lie_codegen.steering.blocks import Block
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 from lie_codegen.steering.plan import Plan
 
@@ -129,7 +129,7 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
                 x, y = obstacle.center
                 rim = x + obstacle.radius * np.cos(phase), y + obstacle.radius * np.sin(phase)
                 axes.fill(*rim, color=COLOURS[1], alpha=0.3)
-            elif isinstance(obstacle, Box | Cylinder):
+            elif isinstance(obstacle, Block):
                 axes.fill(*_outline(obstacle).T, color=COLOURS[1], alpha=0.3)
         axes.set_aspect("equal", "datalim")
         axes.grid(color="0.92")
@@ -145,7 +145,7 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
                 surface = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])
                 points = np.array(obstacle.center)[:, None, None] + obstacle.radius * surface
                 axes.plot_wireframe(*points, color=COLOURS[1], linewidth=0.5, alpha=0.4)
-            elif isinstance(obstacle, Box | Cylinder):
+            elif isinstance(obstacle, Block):
                 axes.plot_wireframe(*_surface(obstacle), color=COLOURS[1], linewidth=0.5, alpha=0.4)
         low, high = np.min(p, axis=0) - 0.15 * size, np.max(p, axis=0) + 0.15 * size
         ends = dict(zip(("xlim", "ylim", "zlim"), zip(low.tolist(), high.tolist(), strict=True), strict=True))
@@ -156,7 +156,7 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
     axes.set(title="path of the vehicle, from the open to the filled dot")
 
 
-def _outline(solid: Box | Cylinder) -> Array:
+def _outline(solid: Block) -> Array:
     """(k, 2) the rim of a solid in the plane: of its inner rectangle, moved out by its rounding."""
     one = solid.solid()
     phase = np.linspace(0, 2 * np.pi, 101)
@@ -167,7 +167,7 @@ def _outline(solid: Box | Cylinder) -> Array:
     return np.asarray(one.centers[0] + (np.sign(out) * one.halves[0] + one.rounding[0] * out) @ one.axes[0].T)
 
 
-def _surface(solid: Box | Cylinder) -> Array:
+def _surface(solid: Block) -> Array:
     """(3, a, b) a net of points on a solid in space."""
     one = solid.solid()
     a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))

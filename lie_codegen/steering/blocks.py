@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +16,27 @@ from lie_codegen.steering.obstacles.solids import Solids
 from lie_codegen.values import settle
 
 
+class Block(Saved, ABC):
+    """An obstacle whose surface is that of one solid."""
+
+    @abstractmethod
+    def solid(self) -> Solids:
+        """As arrays of one."""
+
+    def clearance(self, X: Array) -> Array:
+        """Distance of the position to the surface, (k,): negative inside.
+
+        Args:
+            X: (k, d, d) elements with positions.
+
+        Raises:
+            ArgumentError: positions of another dimension.
+        """
+        return np.asarray(self.solid().seen(np.real(X[:, None, :-1, -1]))[0][:, 0])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Box(Saved):
+class Box(Block):
     """An obstacle: the position, the last column of X, stays out of a box (a rectangle on SE(2)).
 
     Attributes:
@@ -54,20 +74,9 @@ class Box(Saved):
         axes = np.eye(len(self.center)) if self.axes is None else np.array(self.axes)
         return _one(self.center, axes, self.half_sizes, 0.0, False)
 
-    def clearance(self, X: Array) -> Array:
-        """Distance of the position to the surface, (k,): negative inside.
-
-        Args:
-            X: (k, d, d) elements with positions.
-
-        Raises:
-            ArgumentError: positions of another dimension.
-        """
-        return _clearance(self.solid(), X)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cylinder(Saved):
+class Cylinder(Block):
     """An obstacle: the position, the last column of X, stays out of a cylinder (a bar on SE(2)).
 
     Attributes:
@@ -115,24 +124,9 @@ class Cylinder(Saved):
             halves[0] = self.radius
         return _one((start + end) / 2, axes, halves, self.radius * self.rounded, q == 3 and not self.rounded)
 
-    def clearance(self, X: Array) -> Array:
-        """Distance of the position to the surface, (k,): negative inside.
-
-        Args:
-            X: (k, d, d) elements with positions.
-
-        Raises:
-            ArgumentError: positions of another dimension.
-        """
-        return _clearance(self.solid(), X)
-
 
 def _one(center: Any, axes: Array, halves: Any, rounding: float, tube: bool) -> Solids:
     return Solids(np.array([center]), axes[None], np.array([halves]), np.array([rounding]), np.array([tube]))
-
-
-def _clearance(solid: Solids, X: Array) -> Array:
-    return solid.seen(np.real(X[:, None, :-1, -1]))[0][:, 0]
 
 
 def _numbers(value: Any, what: str, dimensions: int = 1) -> Array:

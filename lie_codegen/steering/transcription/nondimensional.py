@@ -11,7 +11,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.flow.elements import group_element
-from lie_codegen.steering.blocks import Box, Cylinder
+from lie_codegen.steering.blocks import Block, Box, Cylinder
 from lie_codegen.steering.constraints import Ball, Cone, check_obstacles, limits
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.torque_reach import require_torques_reach
@@ -64,7 +64,7 @@ def nondimensional(task: Task, asked: Options) -> tuple[Structure, Numbers]:
         asked.intervals,
         cones=sum(isinstance(each, Cone) for each in checked),
         balls=sum(isinstance(each, Ball) for each in checked),
-        solids=sum(isinstance(each, Box | Cylinder) for each in checked),
+        solids=sum(isinstance(each, Block) for each in checked),
         via=tuple(nodes),
         free_time=asked.objective == "time",
         second_order=second is not None,

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, SteeringError
 from lie_codegen.flow.logarithm import distance
-from lie_codegen.steering.blocks import Box, Cylinder
 from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.plan import Facts, Plan, Status
 from lie_codegen.steering.task import Task
@@ -154,9 +153,8 @@ def _guesses(bench: Workbench, asked: Options) -> Iterator[tuple[str, Array]]:
     """The caller's own, and the others."""
     # Beside flat walls, and in least time, ways differ: of three starts none arrived where of eight some did, or the best took up to 1.6
     # times as long. Around balls and cones least energy is the same from three.
-    obstacles = bench.numbers.obstacles
-    hard = any(isinstance(each, Box | Cylinder) for each in obstacles) or (obstacles and bench.structure.free_time)
-    usual = _AMONG_WALLS if hard else _STARTS
+    walls, in_time = bench.structure.solids > 0, bench.structure.free_time and bool(bench.numbers.obstacles)
+    usual = _AMONG_WALLS if walls or in_time else _STARTS
     starts = usual if asked.starts is None else asked.starts
     yield from guesses(bench.task, bench.structure, bench.numbers, starts)
     if asked.guess is not None:
