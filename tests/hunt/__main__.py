@@ -1,17 +1,22 @@
 """The hunt: `python -m tests.hunt [--scale N] [--write]` tries to break what SECURITY.md promises, prints a table, and with --write puts it there.
 
-A scale of 1 takes half an hour on one core, 10 is the slow job. The status is 1 if anything was found. Each part's row is kept as the part ends: an
-interrupted hunt has its figures, and `--resume` goes on with the parts that are not in the table at this scale and commit.
+A scale of 1 takes half an hour of a processor, 10 is the slow job. The status is 1 if anything was found. Each part is a process of its own, as many at
+once as there are processors (`--jobs`): one that is killed has found that, and what it limits or breaks is its own. Its row is kept as it ends: an interrupted
+hunt has its figures, and `--resume` goes on with the parts that are not in the table at this scale and commit.
 """
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import os
 import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 
 from tests.hunt import (
@@ -32,6 +37,7 @@ from tests.hunt import (
 )
 
 Part = Callable[[], tuple[int, list[str]]]
+Ended = tuple[str, int, list[str], float]
 
 
 def parts(scale: int, home: Path) -> dict[str, Part]:
@@ -89,6 +95,39 @@ def hunted(part: Part) -> tuple[int, list[str]]:
         return 1, [traceback.format_exc()]
 
 
+def at_once(every: dict[str, Part], jobs: int) -> Iterator[Ended]:
+    """(what, tried, finds, seconds) of every part as it ends, so many processes at a time; what still runs is ended with the caller."""
+    fork = multiprocessing.get_context("fork")  # the parts are closures, which fork hands on without pickling them
+    waiting = list(every.items())
+    running: dict[Connection, tuple[str, ForkProcess, float]] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                what, part = waiting.pop(0)
+                reads, writes = fork.Pipe(duplex=False)
+                process = fork.Process(target=_told, args=(part, writes))
+                process.start()
+                writes.close()  # the child's copy is the last one: its end is the end of the pipe, even where it was killed
+                running[reads] = what, process, time.perf_counter()
+            ready = wait(list(running))
+            for reads in [each for each in running if each in ready]:
+                what, process, began = running.pop(reads)
+                try:
+                    tried, found = reads.recv()
+                except EOFError:
+                    process.join()
+                    tried, found = 1, [f"its process ended with status {process.exitcode}"]
+                process.join()
+                yield what, tried, found, time.perf_counter() - began
+    finally:
+        for _, process, _ in running.values():
+            process.terminate()
+
+
+def _told(part: Part, writes: Connection) -> None:
+    writes.send(hunted(part))
+
+
 def main() -> int:
     """Hunt, keep a row a part, print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -99,6 +138,7 @@ def main() -> int:
     parser.add_argument(
         "--resume", action="store_true", help="leave out the parts that have a row of this scale and commit"
     )
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="parts at once")
     asked = parser.parse_args()
     page = asked.rows or (rows.PAGE if asked.write else None)
     had = rows.read(page) if page else []
@@ -107,14 +147,16 @@ def main() -> int:
         every = parts(asked.scale, Path(folder))
         commit = rows.commit()
         kept = {row.hunted for row in had if asked.resume and (row.scale, row.commit) == (asked.scale, commit)}
-        for what, part in every.items():
-            if asked.only in what and what not in kept:
-                began = time.perf_counter()
-                tried, found = hunted(part)
-                new.append(rows.Row(what, asked.scale, commit, tried, len(found), round(time.perf_counter() - began)))
-                print(f"{what}: {tried:,} tried, {len(found)} found", *found, sep="\n", flush=True)  # noqa: T201
-                if page:
-                    rows.write(page, rows.joined(had, new, list(every)))
+        took = {row.hunted: row.seconds for row in had}
+        # The longest first, so that none is left alone at the end.
+        left = sorted(
+            (what for what in every if asked.only in what and what not in kept), key=lambda what: -took.get(what, 0)
+        )
+        for what, tried, found, seconds in at_once({what: every[what] for what in left}, asked.jobs):
+            new.append(rows.Row(what, asked.scale, commit, tried, len(found), round(seconds)))
+            print(f"{what}: {tried:,} tried, {len(found)} found", *found, sep="\n", flush=True)  # noqa: T201
+            if page:
+                rows.write(page, rows.joined(had, new, list(every)))
     print(rows.table(rows.joined(had, new, list(every))))  # noqa: T201
     return 1 if any(row.found for row in new) else 0
 

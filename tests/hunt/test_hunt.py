@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -164,28 +166,51 @@ def test_a_part_hunted_again_replaces_its_row_alone(tmp_path: Path) -> None:
 
 
 def test_an_interrupted_hunt_keeps_its_rows_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    hunted: list[str] = []
-    stop = [True]
+    note, page = tmp_path / "hunted", tmp_path / "rows.md"
+    stop = tmp_path / "stop"
+    stop.touch()
 
     def first() -> tuple[int, list[str]]:
-        hunted.append("first")
+        note.write_text("first")
         return 3, []
 
     def second() -> tuple[int, list[str]]:
-        if stop[0]:
-            raise KeyboardInterrupt
-        hunted.append("second")
+        if stop.exists():
+            os.kill(os.getppid(), signal.SIGINT)
+            time.sleep(60.0)
+        note.write_text(note.read_text() + ", second")
         raise ValueError("broken")
 
-    monkeypatch.setattr(whole, "parts", lambda scale, home: {"first": first, "second": second})
-    monkeypatch.setattr("sys.argv", ["hunt", "--scale", "2", "--rows", str(tmp_path / "rows.md"), "--resume"])
+    def third() -> tuple[int, list[str]]:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return 1, []
+
+    monkeypatch.setattr(whole, "parts", lambda scale, home: {"first": first, "second": second, "third": third})
+    monkeypatch.setattr("sys.argv", ["hunt", "--scale", "2", "--rows", str(page), "--resume", "--jobs", "1"])
     with pytest.raises(KeyboardInterrupt):
         whole.main()
-    assert [row.hunted for row in rows.read(tmp_path / "rows.md")] == ["first"]
-    stop[0] = False
-    assert whole.main() == 1  # a part that breaks has found that
-    assert hunted == ["first", "second"]
-    assert [(row.hunted, row.tried, row.found) for row in rows.read(tmp_path / "rows.md")] == [
+    assert [row.hunted for row in rows.read(page)] == ["first"]
+    stop.unlink()
+    assert whole.main() == 1  # a part that breaks, or whose process dies, has found that
+    assert note.read_text() == "first, second"
+    assert [(row.hunted, row.tried, row.found) for row in rows.read(page)] == [
         ("first", 3, 0),
         ("second", 1, 1),
+        ("third", 1, 1),
     ]
+
+
+def test_parts_of_a_hunt_run_at_once(tmp_path: Path) -> None:
+    def meets(mine: str, other: str) -> whole.Part:
+        def part() -> tuple[int, list[str]]:
+            (tmp_path / mine).touch()
+            for _ in range(600):
+                if (tmp_path / other).exists():
+                    return 1, []
+                time.sleep(0.05)
+            return 1, [f"{other} did not run beside {mine}"]
+
+        return part
+
+    ended = list(whole.at_once({"a": meets("a", "b"), "b": meets("b", "a")}, 2))
+    assert sorted((what, found) for what, _, found, _ in ended) == [("a", []), ("b", [])]
