@@ -17,7 +17,6 @@ from tests.hunt import (
     growth,
     hostile,
     kills,
-    matrix,
     methods,
     off_manifold,
     resumed,
@@ -137,13 +136,6 @@ def test_kills_and_planted_files(tmp_path: Path) -> None:
 def test_memory_does_not_grow() -> None:
     tried, found = growth.calls(100_000)
     assert tried > 100_000
-    assert not found, "\n".join(found)
-
-
-@pytest.mark.slow
-def test_the_matrix(tmp_path: Path) -> None:
-    tried, found = matrix.hunt(tmp_path)
-    assert tried > 10
     assert not found, "\n".join(found)
 
 
