@@ -2,13 +2,27 @@
  * Reverse derivatives of Magnus steps of order 8: what a covector of X(T) is on the values of u at the nodes of every step. The cost
  * is that of some steps, whatever the number of values.
  *
- * Everything is a matrix here, and a covector c of the algebra is the matrix C with c(x) = Re tr(C^H hat(x)). In that
- * product the transposes of x -> [x, y] and of y -> [x, y] are Z -> [Z, y^H] and Z -> [x^H, Z]. magnus_group.h is made with all rows
- * and without coordinates for this file.
+ * Where brackets come from structure constants a covector c of the algebra is its values on the basis, and so is all else; states are the
+ * group's own short ones. Of larger groups everything is a whole matrix, and c is the matrix C with c(x) = Re tr(C^H hat(x)). In that
+ * product the transposes of x -> [x, y] and of y -> [x, y] are Z -> [Z, y^H] and Z -> [x^H, Z]. group_view.py makes
+ * magnus_group.h for this file.
  */
 #include "magnus_words.h"
 
-static void adjoint(const V *x, V *z)
+#if COORDINATES
+/* What a covector factor Z of [x, y] is on x and on y. */
+static inline void bracket_back(const V *x, const V *y, double factor, const V *Z, V *on_x, V *on_y)
+{
+    V scaled[WORK];
+    EACH(k, WORK) { scaled[k] = factor * Z[k]; }
+    lie_bracket_back(x, y, scaled, on_x, on_y);
+}
+
+/* z = ad(omega)^T Z, `star` being what `starred` makes of omega. */
+#define starred(omega, star) memcpy((star), (omega), WORK * sizeof(V))
+#define along_back(star, Z, z) lie_along_back((star), (Z), (z))
+#else
+static void starred(const V *x, V *z)
 {
 #if SKEW
     EACH(k, MATRIX) { z[k] = -x[k]; }
@@ -29,18 +43,22 @@ static __attribute__((noinline)) void bracket_back(const V *x, const V *y, doubl
 {
     V scaled[MATRIX], other[MATRIX];
     EACH(k, MATRIX) { scaled[k] = factor * Z[k]; }
-    adjoint(y, other);
+    starred(y, other);
     BRACKET(scaled, other, on_x);
-    adjoint(x, other);
+    starred(x, other);
     BRACKET(other, scaled, on_y);
 }
+
+/* z = ad(omega)^T Z, `star` being omega^H. */
+#define along_back(star, Z, z) BRACKET((star), (Z), (z))
+#endif
 
 /* exponent8 line by line from the last to the first: `out` on Omega becomes `on` on the generators. */
 static void exponent8_back(const V a[ORDERS][WORK], const Stages *st, const V *out, V on[ORDERS][WORK])
 {
-    V x[MATRIX], y[MATRIX], s1[MATRIX], s2[MATRIX], r1[MATRIX], x1[MATRIX], y1[MATRIX];
+    V x[WORK], y[WORK], s1[WORK], s2[WORK], r1[WORK], x1[WORK], y1[WORK];
     bracket_back(st->x4, st->y4, -1.0 / 360, out, x, y);
-    EACH(k, MATRIX) {
+    EACH(k, WORK) {
         on[0][k] = out[k] + x[k];
         on[1][k] = -9.0 * y[k];
         on[2][k] = (out[k] + x[k]) * (1.0 / 12);
@@ -49,33 +67,33 @@ static void exponent8_back(const V a[ORDERS][WORK], const Stages *st, const V *o
         s2[k] = out[k] * (-7.0 / 120) - x[k] * (1.0 / 6);
         r1[k] = 63.0 * y[k];
     }
-    EACH(k, MATRIX) { y1[k] = y[k]; } /* on r2 */
+    EACH(k, WORK) { y1[k] = y[k]; } /* on r2 */
     bracket_back(st->x3, st->y3, -1.0, y1, x, y);
-    EACH(k, MATRIX) {
+    EACH(k, WORK) {
         on[0][k] += x[k];
         on[2][k] += 2.0 * y[k];
         s1[k] += 1.25 * x[k];
         s2[k] += y[k];
     }
-    EACH(k, MATRIX) { y1[k] = y[k]; } /* twice what it is on t2 */
+    EACH(k, WORK) { y1[k] = y[k]; } /* twice what it is on t2 */
     bracket_back(a[1], st->s1, -0.5, y1, x, y);
-    EACH(k, MATRIX) {
+    EACH(k, WORK) {
         on[1][k] += x[k];
         s1[k] += y[k];
     }
     bracket_back(st->x2, st->y2, -1.0, s2, x1, y1);
-    EACH(k, MATRIX) {
+    EACH(k, WORK) {
         s1[k] += x1[k];
         r1[k] += y1[k];
     }
     bracket_back(a[0], st->w1, -1.0 / 3, r1, x, y);
-    EACH(k, MATRIX) {
+    EACH(k, WORK) {
         on[0][k] += x[k];
         on[2][k] -= y[k] * (1.0 / 14);
         s1[k] += y[k];
     }
     bracket_back(st->x1, st->y1, 1.0 / 28, s1, x, y);
-    EACH(k, MATRIX) {
+    EACH(k, WORK) {
         x1[k] += x[k];
         y1[k] += y[k];
         on[0][k] += x1[k];
@@ -91,13 +109,13 @@ static void exponent8_back(const V a[ORDERS][WORK], const Stages *st, const V *o
  */
 static void carry_back(const V *omega, V *C, V *out)
 {
-    V star[MATRIX], term[MATRIX], next[MATRIX];
-    adjoint(omega, star);
-    EACH(k, MATRIX) { out[k] = term[k] = C[k]; }
+    V star[WORK], term[WORK], next[WORK];
+    starred(omega, star);
+    EACH(k, WORK) { out[k] = term[k] = C[k]; }
     for (int j = 2; j < 40; ++j) {
         V size = splat(0.0), whole = splat(0.0);
-        BRACKET(star, term, next);
-        EACH(k, MATRIX) {
+        along_back(star, term, next);
+        EACH(k, WORK) {
             term[k] = next[k] * (-1.0 / j);
             out[k] += term[k];
             size += term[k] * term[k];
@@ -107,8 +125,8 @@ static void carry_back(const V *omega, V *C, V *out)
             break;
         }
     }
-    BRACKET(star, out, next);
-    EACH(k, MATRIX) { C[k] -= next[k]; }
+    along_back(star, out, next);
+    EACH(k, WORK) { C[k] -= next[k]; }
 }
 
 /* The steps of each lane: from first[l] on, as many as `longest` at most. */
@@ -123,7 +141,7 @@ static ptrdiff_t share(ptrdiff_t steps, ptrdiff_t *first)
 }
 
 /* Omega of step k of every lane, with its generators and stages; a lane that has no such step gets zero. */
-static void exponent_of(const Input *u, const double *lengths, const ptrdiff_t *first, ptrdiff_t k, V *h, V a[ORDERS][MATRIX],
+static void exponent_of(const Input *u, const double *lengths, const ptrdiff_t *first, ptrdiff_t k, V *h, V a[ORDERS][WORK],
     Stages *st, V *omega)
 {
     V coordinates[ORDERS][DIM];
@@ -137,7 +155,11 @@ static void exponent_of(const Input *u, const double *lengths, const ptrdiff_t *
         EACH(i, DIM) { coordinates[j][i] = splat(0.0); }
     }
     from_nodes(u, table, DIM, *h, coordinates);
+#if COORDINATES
+    memcpy(a, coordinates, sizeof coordinates);
+#else
     EACH(j, ORDERS) { hat(coordinates[j], a[j]); }
+#endif
     exponent8((const V (*)[WORK])a, st, omega);
 }
 
@@ -147,7 +169,7 @@ EXPORT void magnus_lane_products(const Input *u, const double *lengths, ptrdiff_
 {
     ptrdiff_t first[LANES + 1];
     const ptrdiff_t longest = share(steps, first);
-    V state[STATE], a[ORDERS][MATRIX], omega[WORK], h = splat(0.0);
+    V state[STATE], a[ORDERS][WORK], omega[WORK], h = splat(0.0);
     Stages stages;
     identity(state);
     for (ptrdiff_t k = 0; k < longest; ++k) {
@@ -171,19 +193,30 @@ EXPORT void magnus_pullback(const Input *u, const double *lengths, ptrdiff_t ste
 {
     ptrdiff_t first[LANES + 1];
     const ptrdiff_t longest = share(steps, first);
-    V covector[MATRIX], out[MATRIX], a[ORDERS][MATRIX], on[ORDERS][MATRIX], omega[WORK], h = splat(0.0);
+    V given[FULL], covector[WORK], out[WORK], a[ORDERS][WORK], on[ORDERS][WORK], omega[WORK], h = splat(0.0);
     Stages stages;
     EACH(l, LANES) {
         double whole[FULL];
         get(C + l * PARTS * SIZE * SIZE, whole);
-        EACH(k, MATRIX) { covector[k][l] = whole[k]; }
+        EACH(k, FULL) { given[k][l] = whole[k]; }
     }
+#if COORDINATES
+    hat_back(given, covector);
+#else
+    memcpy(covector, given, sizeof covector);
+#endif
     for (ptrdiff_t k = longest - 1; k >= 0; --k) {
+#if COORDINATES
+#define on_a on
+#else
         V on_a[ORDERS][DIM];
+#endif
         exponent_of(u, lengths, first, k, &h, a, &stages, omega);
         carry_back(omega, covector, out);
         exponent8_back((const V (*)[WORK])a, &stages, out, on);
+#if !COORDINATES
         EACH(j, ORDERS) { hat_back(on[j], on_a[j]); }
+#endif
         for (ptrdiff_t g = 0; g < u->nodes; ++g) {
             EACH(i, DIM) {
                 V value = splat(0.0);

@@ -17,7 +17,7 @@ def cotangent(group: lc.MatrixGroup, seed: int = 3) -> np.ndarray:
     return parts[0] + 1j * parts[1] if group.is_complex else parts[0]
 
 
-@pytest.mark.parametrize("name", ["so3", "su2", "se3", "su3", "so7", "gl3", "sl2", "h3", "osc4"])
+@pytest.mark.parametrize("name", ["so3", "su2", "se3", "su3", "so7", "gl3", "sl2", "h3", "osc4", "r3", "se_2_3", "su4"])
 def test_lanes_and_numpy_pull_the_same_covector_back(name: str) -> None:
     group, rng = lc.group(name), np.random.default_rng(0)
     values, lengths = rng.normal(size=(43, 6, group.dim)) / np.sqrt(group.dim), rng.uniform(0.05, 0.2, 43)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ MOST_UNROLLED = 15
 
 Term = tuple[str, int]
 Bracket = tuple[str, int, int]
+#: Whether the entry is the second of a pair i < j, the pair, and the other of the two.
+PairTerm = tuple[int, int, int, int]
 Product = tuple[str, tuple[int, ...]]
 
 
@@ -38,6 +40,8 @@ class GroupView:
     brackets: tuple[tuple[Bracket, ...], ...]
     matrix: tuple[tuple[Product, ...], ...]
     back: tuple[tuple[Term, ...], ...] = ()
+    pairs_back: tuple[tuple[Term, ...], ...] = ()
+    entries_back: tuple[tuple[PairTerm, ...], ...] = ()
 
 
 def group_view(group: MatrixGroup) -> GroupView:
@@ -59,14 +63,20 @@ def group_view(group: MatrixGroup) -> GroupView:
     )  # fmt: skip
 
 
-def whole_matrix_view(group: MatrixGroup) -> GroupView:
-    """The view in which everything is a whole matrix, for magnus_pullback.c."""
-    basis, d = np.asarray(group.basis), group.degree
+def reverse_view(group: MatrixGroup) -> GroupView:
+    """The view for magnus_pullback.c: brackets backwards where they come from structure constants, else whole matrices."""
+    basis, c, d = np.asarray(group.basis), group.algebra.structure_constants, group.degree
     parts = (basis.real, basis.imag) if group.is_complex else (basis.real,)
-    skew = bool(np.all(basis == -np.conj(np.swapaxes(basis, 1, 2))))
     flat = np.concatenate([part.reshape(group.dim, d * d) for part in parts], axis=1)
     hat, back = (tuple(_terms(column) for column in table) for table in (flat.T, flat))
-    return GroupView(group.name, group.dim, d, len(parts), d, int(skew), 0, 0, repr(0.0), hat, (), (), (), back)
+    view = group_view(group)
+    if not view.coordinates:
+        return replace(view, rows=d, hat=hat, back=back)
+    pairs_back = tuple(_terms(c[i, j]) for i, j in view.pairs)
+    entries_back = tuple(
+        tuple((int(k == j), i, j, i if k == j else j) for i, j in view.pairs if k in (i, j)) for k in range(group.dim)
+    )
+    return replace(view, back=back, pairs_back=pairs_back, entries_back=entries_back)
 
 
 def _terms(column: Array) -> tuple[Term, ...]:

@@ -235,9 +235,9 @@ def _opened(group: MatrixGroup, stem: str) -> ctypes.CDLL | None:
     def files() -> dict[str, str]:
         from lie_codegen.codegen.opcodes import in_single
         from lie_codegen.codegen.templates import render
-        from lie_codegen.flow.magnus.group_view import group_view, whole_matrix_view
+        from lie_codegen.flow.magnus.group_view import group_view, reverse_view
 
-        view = (whole_matrix_view if stem == "magnus_pullback" else group_view)(group)
+        view = (reverse_view if stem == "magnus_pullback" else group_view)(group)
         names = (f"{stem}.c", *_HEADERS, *_MORE.get(stem, ()))
         source = {name: name for name in names}
         if stem == "magnus_single":
