@@ -17,6 +17,7 @@ from tests.hunt import (
     growth,
     hostile,
     kills,
+    matrix,
     methods,
     off_manifold,
     resumed,
