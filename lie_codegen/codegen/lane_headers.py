@@ -64,7 +64,7 @@ def in_floats(text: str) -> str:
 
 
 def _records(lanes: int, streaming: str) -> dict[str, object]:
-    return {"networks": [networks(lanes >> k) for k in range(3)], "streaming": streaming}
+    return {"networks": [networks(lanes >> k) for k in range(3)], "streaming": streaming, "item": 64 // lanes}
 
 
 def _polynomials(table: _Table, literal: Callable[[float], str] = c_literal) -> list[tuple[str, _Polynomial]]:

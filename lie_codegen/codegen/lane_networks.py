@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+#: A record longer than the lanes that has a network of its own.
+_NINE = 9
+
 
 @dataclass(frozen=True)
 class Mix:
@@ -30,8 +33,8 @@ class Network:
 
 @dataclass(frozen=True)
 class LaneNetworks:
-    """All that one number of lanes needs: records smaller than it, the square transposition, that of half as many columns, and the places
-    of (low, low), (low, high), (high, low), (high, high) halves of two vectors.
+    """All that one number of lanes needs: records smaller than it and stores of nine, the square transposition, that of half as many
+    columns, and the places of (low, low), (low, high), (high, low), (high, high) halves of two vectors.
     """
 
     lanes: int
@@ -48,7 +51,9 @@ def networks(lanes: int) -> LaneNetworks:
     return LaneNetworks(
         lanes=lanes,
         loads=tuple(_Maker(lanes).network(size, load=True) for size in sizes),
-        stores=tuple(_Maker(lanes).network(size, load=False) for size in sizes),
+        # nine, a 3 x 3 matrix: its rows cross lines, and the last column would go entry by entry
+        stores=tuple(_Maker(lanes).network(size, load=False) for size in sizes)
+        + ((_Maker(lanes).rows(_NINE),) if lanes < _NINE else ()),
         square=_Maker(lanes).square(lanes),
         half_square=_Maker(lanes).square(half),
         picks=tuple((*range(a, a + half), *range(b, b + half)) for a in (0, half) for b in (lanes, lanes + half)),
@@ -67,11 +72,11 @@ class _Maker:
         results = self._apart(names) if load else self._together(names)
         return Network(size, tuple(self._steps), tuple(results))
 
-    def square(self, rows: int) -> Network:
+    def square(self, rows: int, columns: Sequence[str] | None = None) -> Network:
         """Swaps bit after bit of the row index with that of the column index; of fewer rows than lanes, squares beside one another."""
         # A transposition exchanges row and column index, and so does exchanging their bits one after the other: for bit b the entry
         # (row without b, column with b) goes to (row with b, column without b). Each takes one shuffle a vector: log2(L) in all.
-        names = [f"a{k}" for k in range(rows)]
+        names = [f"a{k}" for k in range(rows)] if columns is None else list(columns)
         bit = 1
         while bit < rows:
             for row in range(rows):
@@ -82,6 +87,23 @@ class _Maker:
                     names[row], names[row | bit] = self._mix(*pair, low), self._mix(*pair, high)
             bit *= 2
         return Network(rows, tuple(self._steps), tuple(names))
+
+    def rows(self, size: int) -> Network:
+        """Stores of records longer than the lanes: squares, and what follows one another in memory picked from their rows."""
+        entries, lanes = [f"a{k}" for k in range(size)], self._lanes
+        full = size - size % lanes
+        squares = [self.square(lanes, entries[k : k + lanes]) for k in range(0, full, lanes)]
+        names = [name for square in squares for name in square.results] + entries[full:]
+
+        def place(row: int, entry: int) -> tuple[int, int]:
+            # a row of a square holds entries of one sample; the columns left over still hold one entry of all samples
+            return (entry - entry % lanes + row, entry % lanes) if entry < full else (entry, row)
+
+        runs = [
+            [place(*divmod(k, size)) for k in range(start, start + lanes)] for start in range(0, size * lanes, lanes)
+        ]
+        results = [self._collect(names, run) for run in runs]
+        return Network(size, tuple(self._steps), tuple(results))
 
     def _mix(self, first: str, second: str, picks: Sequence[int]) -> str:
         name = f"b{len(self._steps)}"

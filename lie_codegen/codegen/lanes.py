@@ -18,6 +18,9 @@ INLINE = 400
 #: Statements from which a body is not interleaved with its twin: the processor then finds enough independent work in one
 #: vector of samples, and two run out of registers (measured: 204 and 258 statements gain a sixth and a quarter, 289 lose a tenth).
 TWIN = 260
+#: Statements a number that is read or written, up to which a loop of its own stores large results past the caches as they are made: beyond,
+#: computing takes longer than moving, and the compiler's time for a third copy of the body buys nothing.
+MOVING = 10
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ class LaneBody:
         parts: functions before this one if the tape is long; they store in the array `work`, of `work_size` vectors.
         twin: the same for a second vector of samples, to be interleaved with the first; its entries follow those of the
             first in every port. Only for short bodies.
+        past: whether the twins have a second loop, for results that go past the caches.
     """
 
     statements: tuple[LaneStatement | LaneBlock, ...]
@@ -99,6 +103,7 @@ class LaneBody:
     parts: tuple[LaneBody, ...] = ()
     work_size: int = 0
     twin: LaneBody | None = None
+    past: bool = False
 
     @property
     def inline(self) -> bool:
@@ -137,7 +142,11 @@ def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBod
     pieces = split(tape, ports)
     if pieces is None:
         body = _body(tape, target)
-        return replace(body, twin=_twin(tape, sizes, target)) if body.size < TWIN else body
+        if body.size >= TWIN:
+            return body
+        return replace(
+            body, twin=_twin(tape, sizes, target), past=body.size <= MOVING * (sum(sizes) + len(body.stores))
+        )
     parts = []
     for part in pieces.parts:
         body = _body(part.tape, target, ports)

@@ -229,25 +229,50 @@ def test_divisions_that_share_a_divisor_are_one() -> None:
     np.testing.assert_allclose(lib.shares.batch(x), [lib.shares(row) for row in x], rtol=6e-16)
 
 
+def _short_body(ops: Any, x: Any) -> tuple[Any, ...]:
+    return [ops.sin(x), x, 2 * x, x * x, 1], [x * x * x, x + 1]
+
+
+def _whole_rows(ops: Any, x: Any) -> tuple[Any, ...]:
+    return [x + k for k in range(9)], [x * k for k in range(16)], [k - x for k in range(12)]
+
+
+def _no_whole_rows(ops: Any, x: Any) -> tuple[Any, ...]:
+    return [x + k for k in range(9)], [x * k for k in range(11)]
+
+
+def _long_body(ops: Any, x: Any) -> tuple[Any, ...]:
+    y = x
+    for k in range(200):
+        y = y * x + k % 3  # two statements each: too long for a twin
+    return [y, x, 2 * x], [ops.sin(y)] * 8
+
+
 @pytest.mark.parametrize("shift", [0, 1, 2])
-def test_results_beyond_the_caches_are_the_same(shift: int) -> None:
-    """Streaming stores serve arrays of 16 MiB and more that begin at 16 bytes; the others do not use them."""
+@pytest.mark.parametrize("body", [_short_body, _whole_rows, _no_whole_rows, _long_body])
+def test_results_beyond_the_caches_are_the_same(body: Any, shift: int) -> None:
+    """Streaming stores serve arrays of 16 MiB and more that begin at 16 bytes, as they are made from 64 on; the others do not use them."""
 
-    def body(ops: Any, x: Any) -> tuple[Any, ...]:
-        return [ops.sin(x), x, 2 * x, x * x, 1], [x * x * x, x + 1]
+    def aligned(size: int) -> Any:
+        room = np.full(count * size + shift + 9, np.nan)
+        return room[-room.ctypes.data % 64 // 8 :][: count * size + shift + 1]  # from a multiple of 64 bytes
 
-    kernel = Kernel("stream", "toy", (Port("x", ()),), (Port("y", (5,)), Port("z", (2,))), body)
-    stream = build_kernels(lambda: (kernel,)).stream
-    count = 2**21 // 2 + 13
-    x = np.random.default_rng(0).normal(size=count)
-    y, z = (np.full(count * size + shift + 1, np.nan) for size in (5, 2))
-    out = (y[shift:-1].reshape(count, 5), z[shift:-1].reshape(count, 2))
+    sizes = [len(entries) for entries in body(np, 0.5)]
+    ports = tuple(Port(f"y{k}", (size,)) for k, size in enumerate(sizes))
+    stream = build_kernels(lambda: (Kernel("stream", "toy", (Port("x", ()),), ports, body),)).stream
+    count = 2**21 // min(sizes) + 13
+    x = np.random.default_rng(0).uniform(-1, 1, count)
+    rooms = [aligned(size) for size in sizes]
+    out = tuple(room[shift:-1].reshape(count, size) for room, size in zip(rooms, sizes, strict=True))
     stream.batch(x, out=out)
-    assert all(np.isnan(each[-1]) and np.isnan(each[:shift]).all() for each in (y, z))
+    assert all(np.isnan(room[-1]) and np.isnan(room[:shift]).all() for room in rooms)
+    assert not any(np.isnan(each).any() for each in out)
     for start in (0, 1000, count - 50):
-        for whole, part in zip(out, stream.batch(x[start : start + 50]), strict=True):
-            np.testing.assert_array_equal(whole[start : start + 50], part)
-    np.testing.assert_array_equal(out[1], np.stack([x * x * x, x + 1], axis=1))
+        some = slice(start, start + 50)
+        for whole, part, entries in zip(out, stream.batch(x[some]), body(np, x[some]), strict=True):
+            np.testing.assert_array_equal(whole[some], part)
+            columns = [np.broadcast_to(entry, 50) for entry in entries]
+            np.testing.assert_allclose(whole[some].T, columns, rtol=1e-14, atol=1e-14)
 
 
 @pytest.fixture

@@ -29,10 +29,10 @@ ONE(sin) ONE(cos) ONE(tan) ONE(exp) ONE(expm1) ONE(log) ONE(atan) ONE(asin) ONE(
 ONE(floor) ONE(ceil) ONE(fabs) ONE(sqrt) ONE(sign)
 TWO(atan2) TWO(fmin) TWO(fmax) TWO(copysign)
 
-/* Records of every size there and back: 0 if they arrive in their lanes and return unchanged. */
+/* Records of every size there and back: 0 if they arrive in their lanes and return unchanged, past the caches too. */
 #define SIZE(s) \
     { \
-        double from[s * LCG_LANES], to[s * LCG_LANES]; \
+        double from[s * LCG_LANES], to[s * LCG_LANES], lines[s * LCG_LANES] __attribute__((aligned(64))); \
         lcg_v columns[s]; \
         for (i = 0; i < s * LCG_LANES; ++i) { \
             from[i] = i + 1; \
@@ -43,8 +43,13 @@ TWO(atan2) TWO(fmin) TWO(fmax) TWO(copysign)
                 wrong += columns[i][lane] != from[lane * s + i]; \
             } \
         } \
-        lcg_out(to, columns, s); \
+        lcg_out(to, columns, s, 0); \
         wrong += memcmp(from, to, sizeof from) != 0; \
+        if (lcg_whole(s)) { \
+            lcg_out(lines, columns, s, 1); \
+            lcg_fence(); \
+            wrong += memcmp(from, lines, sizeof from) != 0; \
+        } \
     }
 
 int records(void)
