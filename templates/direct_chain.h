@@ -6,22 +6,31 @@
 
 enum { PACKED = N * (N + 1) / 2 }; /* entries of a lower triangle */
 
+/* The entries (i, j, k) of a table that are not zero, those of i from first[i] to first[i + 1]. */
+typedef struct {
+    const int *first, *j, *k;
+    const double *value;
+} sparse;
+
 /* As `_Programme` of compiled.py. */
 typedef struct {
-    int exponentials, slots, rows, entry_lanes, free_phase, fuel, reach_iterations, descend_iterations, wanted;
+    int exponentials, slots, rows, entry_lanes, free_phase, fuel, reach_iterations, descend_iterations, wanted, unitary;
     double enough, damping, relative;
     const double *start;      /* (D, D) L X0 */
     const double *right;      /* (D, D) R */
     const double *value;      /* (lanes, D, D) */
-    const double *basis;      /* (N, D, D) */
-    const double *drifts;     /* (rows, D, D) */
-    const double *directions; /* (rows, M, D, D) */
+    const double *drifts;     /* (rows, N) coordinates in the algebra, as of the directions */
+    const double *directions; /* (rows, M, N) */
     const double *share;      /* (exponentials, 2) p_k, q_k */
     const double *low, *high; /* (slots, M) */
     const double *weight;     /* (slots, M) */
     const double *mass;       /* (slots) */
     const int *entry;         /* (entry_lanes, exponentials) the row of each exponential */
     const int *slot;          /* (exponentials) */
+    sparse basis;             /* (i, 0, e): entry e of the matrix A_i */
+    sparse matrix;            /* (e, 0, i): the same by entries */
+    sparse dual;              /* (i, 0, e): x_i = sum value matrix[e] for a matrix sum x_i A_i */
+    sparse bracket;           /* (i, j, k): component i of [A_j, A_k] */
 } programme;
 
 /* Controls and what is known there: the residual's norm, its reduced coordinates r and their derivative J. */
@@ -35,13 +44,23 @@ typedef struct {
 /* One group of lanes at work. */
 typedef struct {
     const programme *p;
-    int columns;         /* C = slots M */
-    int lane[LANES];     /* the caller's number of each lane */
+    int columns;        /* C = slots M */
+    int plain;          /* whether R is the identity */
+    int lane[LANES];    /* the caller's number of each lane */
     V value[ENTRIES];
-    V *E, *dE, *before;  /* (exponentials, ...) */
-    V *f, *t, *v, *z;    /* (C) each */
-    V *g, *s, *d, *x;    /* (C) each, of Newton's steps */
-    V *Z;                /* (N, ENTRIES) rows that reduce the residual */
+    V *E;               /* (exponentials, ENTRIES) */
+    V *x;               /* (exponentials, N) coordinates of the exponents */
+    V *bodily;          /* (exponentials, M, N) coordinates of X^-1 dX along each control */
+    V *ad;              /* entries of ad_x, one for each of `acting` */
+    int first[N + 1];
+    sparse acting;      /* those of `bracket` whose j some exponent has */
+    V *f, *t, *v, *z;   /* (C) each */
+    V *g, *s, *d, *n;   /* (C) each, of Newton's steps */
+    V *twice, *within;  /* (N, N) and (exponentials, M, M): second derivatives across exponentials and within one */
+    V *moved;           /* (exponentials, N) */
+    V *Z;               /* (N, ENTRIES) derivatives of the residual along the basis */
+    V end[ENTRIES];     /* L X */
+    V G[PACKED], over[N]; /* Cholesky factor of Z'Z, the inverse of its diagonal */
     point at, trial, kept;
 } task;
 
@@ -60,39 +79,48 @@ static V looked_up(const task *w, const double *table, int width, int k, int e)
     return value;
 }
 
-/* Whether any lane finds a number other than zero there. */
-static unsigned char given(const task *w, const double *table, int width, int k, int e)
-{
-    const programme *p = w->p;
-    int l, found = 0;
-    if (p->entry_lanes == 1) {
-        return table[(size_t)p->entry[k] * width + e] != 0.0;
-    }
-    for (l = 0; l < LANES; ++l) {
-        found |= table[(size_t)p->entry[w->lane[l] * p->exponentials + k] * width + e] != 0.0;
-    }
-    return (unsigned char)found;
-}
-
-/* The exponent of E_k, its derivatives b by the controls of its slot, and which of their entries are not zero. */
-static void exponent(const task *w, int k, const V *u, V *a, V *b, unsigned char *there)
+/* Coordinates x of the exponent of E_k. */
+static void exponent(const task *w, int k, const V *u, V *x)
 {
     const programme *p = w->p;
     const V *first = u + p->slot[k] * M, *second = p->share[2 * k + 1] != 0.0 ? first + M : first;
-    int e, i;
-    for (e = 0; e < ENTRIES; ++e) {
-        a[e] = looked_up(w, p->drifts, ENTRIES, k, e);
+    int c, i;
+    for (c = 0; c < N; ++c) {
+        x[c] = looked_up(w, p->drifts, N, k, c);
     }
     for (i = 0; i < M; ++i) {
         const V driven = p->share[2 * k] * first[i] + p->share[2 * k + 1] * second[i];
-        for (e = 0; e < ENTRIES; ++e) {
-            const int place = i * ENTRIES + e;
-            there[place] = given(w, p->directions, M * ENTRIES, k, place);
-            b[place] = there[place] ? looked_up(w, p->directions, M * ENTRIES, k, place) : spread(0.0);
-            if (there[place]) {
-                a[e] += driven * b[place];
-            }
+        for (c = 0; c < N; ++c) {
+            x[c] += driven * looked_up(w, p->directions, M * N, k, i * N + c);
         }
+    }
+}
+
+/* The matrix sum x_i A_i. */
+static void hat(const programme *p, const V *x, V *a)
+{
+    const sparse *c = &p->matrix;
+    int e, n;
+    for (e = 0; e < ENTRIES; ++e) {
+        V sum = spread(0.0);
+        for (n = c->first[e]; n < c->first[e + 1]; ++n) {
+            sum += c->value[n] * x[c->k[n]];
+        }
+        a[e] = sum;
+    }
+}
+
+/* Coordinates x of a matrix of the algebra. */
+static void coordinates(const programme *p, const V *a, V *x)
+{
+    const sparse *c = &p->dual;
+    int i, n;
+    for (i = 0; i < N; ++i) {
+        V sum = spread(0.0);
+        for (n = c->first[i]; n < c->first[i + 1]; ++n) {
+            sum += c->value[n] * a[c->k[n]];
+        }
+        x[i] = sum;
     }
 }
 
@@ -136,18 +164,18 @@ static void substitute(const V *L, const V *inverse, V *y)
 }
 
 /*
- * The residual at Y = L X, and rows Z that reduce it to N numbers: with D = dr/dx along X hat(x) and D'D = G G',
- * the rows G^-1 D' are an orthonormal basis of what motions of X can change. Entries that no motion changes drop out.
+ * The residual at Y = L X, and its derivatives Z along X hat(A_i). With Z'Z = G G', the rows G^-1 Z' are an orthonormal
+ * basis of what motions of X can change: r are the residual's coordinates in it. Entries that no motion changes drop out.
  */
-static void reduce(const task *w, const V *Y, point *at, V *Z)
+static void reduce(task *w, point *at)
 {
     const programme *p = w->p;
-    V here[ENTRIES], right[ENTRIES], G[PACKED], inverse[N], trace = spread(0.0), full = spread(0.0);
-    V value[ENTRIES];
+    const V *Y = w->end;
+    V here[ENTRIES], right[ENTRIES], value[ENTRIES], turned[ENTRIES], trace = spread(0.0), full = spread(0.0);
 #if PARTS == 2
     V overlap_r = spread(0.0), overlap_i = spread(0.0);
 #endif
-    int e, i, j, k, x, y;
+    int e, i, j;
     for (e = 0; e < ENTRIES; ++e) {
         right[e] = spread(p->right[e]);
     }
@@ -175,25 +203,12 @@ static void reduce(const task *w, const V *Y, point *at, V *Z)
     }
     at->size = root(full);
     for (i = 0; i < N; ++i) {
-        V turned[ENTRIES], *slope = Z + i * ENTRIES;
-        /* hat(A_i) R in plain doubles: one of each for all lanes */
-        for (x = 0; x < D; ++x) {
-            for (y = 0; y < D; ++y) {
-                double re = 0.0, im = 0.0;
-                for (k = 0; k < D; ++k) {
-                    const double *a = p->basis + i * ENTRIES + (x * D + k) * PARTS;
-                    const double *b = p->right + (k * D + y) * PARTS;
-                    re += a[0] * b[0];
-#if PARTS == 2
-                    re -= a[1] * b[1];
-                    im += a[0] * b[1] + a[1] * b[0];
-#endif
-                }
-                turned[(x * D + y) * PARTS] = spread(re);
-                turned[(x * D + y) * PARTS + PARTS - 1] = spread(PARTS == 2 ? im : re);
-            }
+        const int first = p->basis.first[i], count = p->basis.first[i + 1] - first;
+        V *slope = w->Z + i * ENTRIES, along = spread(0.0);
+        multiply_given(Y, p->basis.k + first, p->basis.value + first, count, w->plain ? slope : turned);
+        if (!w->plain) {
+            multiply(turned, right, 0, slope);
         }
-        multiply(Y, turned, 0, slope);
 #if PARTS == 2
         if (p->free_phase) {
             /* the phase follows: its rate is Im(<U, X A> / <U, X>) */
@@ -210,144 +225,253 @@ static void reduce(const task *w, const V *Y, point *at, V *Z)
             }
         }
 #endif
-    }
-    for (i = 0; i < N; ++i) {
-        for (j = 0; j <= i; ++j) {
-            V sum = spread(0.0);
-            for (e = 0; e < ENTRIES; ++e) {
-                sum += Z[i * ENTRIES + e] * Z[j * ENTRIES + e];
-            }
-            G[i * (i + 1) / 2 + j] = sum;
+        for (e = 0; e < ENTRIES; ++e) {
+            along += slope[e] * here[e];
         }
-        trace += G[i * (i + 1) / 2 + i];
+        at->r[i] = along;
+        for (j = 0; j <= i; ++j) {
+            const V *other = w->Z + j * ENTRIES;
+            V even = spread(0.0), odd = even; /* two sums side by side, for each waits for itself */
+            for (e = 0; e + 1 < ENTRIES; e += 2) {
+                even += slope[e] * other[e];
+                odd += slope[e + 1] * other[e + 1];
+            }
+            if (ENTRIES % 2) {
+                even += slope[ENTRIES - 1] * other[ENTRIES - 1];
+            }
+            w->G[i * (i + 1) / 2 + j] = even + odd;
+        }
+        trace += w->G[i * (i + 1) / 2 + i];
     }
     /* Motions that the goal leaves free change nothing: G is singular along them, and rounding may make it indefinite. */
     for (i = 0; i < N; ++i) {
-        G[i * (i + 1) / 2 + i] += 1e-13 / N * trace + 1e-300;
+        w->G[i * (i + 1) / 2 + i] += 1e-13 / N * trace + 1e-300;
     }
-    factor(G, inverse);
-    /* Forward substitution with G's factor is Gram and Schmidt's process: rows before the i-th are orthonormal when it is reached. */
+    factor(w->G, w->over);
     for (i = 0; i < N; ++i) {
-        V *row = Z + i * ENTRIES, sum = spread(0.0);
+        /* a row of length zero but for rounding and that shift: what it says is rounding, so it says nothing */
+        const V pivot = w->G[i * (i + 1) / 2 + i];
+        const Mask rounding = NOT(LESS(4e-13 / N * trace, pivot * pivot));
+        w->over[i] = SELECT(rounding, spread(0.0), w->over[i]);
+        for (j = i; j < N; ++j) {
+            w->G[j * (j + 1) / 2 + i] = SELECT(rounding, spread(0.0), w->G[j * (j + 1) / 2 + i]);
+        }
         for (j = 0; j < i; ++j) {
-            for (e = 0; e < ENTRIES; ++e) {
-                row[e] -= G[i * (i + 1) / 2 + j] * Z[j * ENTRIES + e];
-            }
+            at->r[i] -= w->G[i * (i + 1) / 2 + j] * at->r[j];
         }
-        for (e = 0; e < ENTRIES; ++e) {
-            row[e] *= inverse[i];
-            sum += row[e] * here[e];
-        }
-        at->r[i] = sum;
+        at->r[i] *= w->over[i];
     }
 }
 
-/* The exponentials of the controls u, `count` of their derivatives (M or none), and the products L X0 E_1 .. E_k up to Y. */
-static void chain(task *w, const V *u, int count)
-{
-    const programme *p = w->p;
-    V a[ENTRIES], b[M * ENTRIES];
-    unsigned char there[M * ENTRIES];
-    int k, e;
-    for (e = 0; e < ENTRIES; ++e) {
-        w->before[e] = spread(p->start[e]);
-    }
-    for (k = 0; k < p->exponentials; ++k) {
-        exponent(w, k, u, a, b, there);
-        exponentials(a, count, b, there, w->E + k * ENTRIES, w->dE + (size_t)k * M * ENTRIES);
-        multiply(w->before + k * ENTRIES, w->E + k * ENTRIES, 0, w->before + (k + 1) * ENTRIES);
-    }
-}
-
-/* Residual at at->u, and the rows Z that reduce it there. */
+/* Residual at at->u, with the exponentials and the rows Z there. */
 static void examine(task *w, point *at)
 {
-    chain(w, at->u, 0);
-    reduce(w, w->before + w->p->exponentials * ENTRIES, at, w->Z);
+    const programme *p = w->p;
+    V a[ENTRIES];
+    int k, e;
+    for (e = 0; e < ENTRIES; ++e) {
+        w->end[e] = spread(p->start[e]);
+    }
+    for (k = 0; k < p->exponentials; ++k) {
+        exponent(w, k, at->u, w->x + k * N);
+        hat(p, w->x + k * N, a);
+        exponential(a, w->E + k * ENTRIES);
+        multiply(w->end, w->E + k * ENTRIES, 0, w->end);
+    }
+    reduce(w, at);
 }
 
-/* Residual and derivative at at->u: dY/du = (L X0 E_1 .. E_k-1) dE_k (E_k+1 .. E_K R). */
-static void linearise(task *w, point *at)
+/* The inverse of E_k = exp(x). */
+static void inverse_of(const programme *p, const V *x, const V *E, V *F)
+{
+    V a[ENTRIES];
+    int e;
+    if (p->unitary) {
+        adjoint(E, F);
+        return;
+    }
+    hat(p, x, a);
+    for (e = 0; e < ENTRIES; ++e) {
+        a[e] = -a[e];
+    }
+    exponential(a, F);
+}
+
+/* Coordinates of F hat(g) E, for E and its inverse F; in place. */
+static void turn(const programme *p, const V *F, const V *E, V *g)
+{
+    V a[ENTRIES], b[ENTRIES];
+    hat(p, g, a);
+    multiply(F, a, 0, b);
+    multiply(b, E, 0, a);
+    coordinates(p, a, g);
+}
+
+/* The entries of ad_x; the largest sum of a row, which bounds its eigenvalues. */
+static double adjoint_action(const task *w, const V *x)
+{
+    const sparse *c = &w->acting;
+    V most = spread(0.0);
+    int i, n;
+    for (i = 0; i < N; ++i) {
+        V sum = spread(0.0);
+        for (n = c->first[i]; n < c->first[i + 1]; ++n) {
+            const V entry = c->value[n] * x[c->j[n]];
+            w->ad[n] = entry;
+            sum += largest(entry, -entry);
+        }
+        most = largest(most, sum);
+    }
+    return fmin(widest(most), 1e6);
+}
+
+/* Terms after which sum ad^j / (j + 1)! is exact to rounding for ad of that size. */
+static int terms(double size)
+{
+    double left = 1.0;
+    int j = 0;
+    while (left > 1e-15 && j < 100) {
+        ++j;
+        left *= size / (j + 1);
+    }
+    return j;
+}
+
+/*
+ * Coordinates of E^-1 dE along the M directions of E_k = exp(x): g_i = sum_j (-ad_x)^j b_i / (j + 1)!, (N, M). In the algebra ad_x has few
+ * entries, and vectors of N numbers take the place of matrices. Long x are halved: g(2 x) = (g(x) + E^-1 g(x) E) / 2 for E = exp(x).
+ */
+static void turning(task *w, int k, V *g)
 {
     const programme *p = w->p;
-    V tail[ENTRIES], moved[ENTRIES], column[ENTRIES], *Z = w->Z;
-    int k, i, e, row;
-    for (e = 0; e < ENTRIES; ++e) {
-        tail[e] = spread(p->right[e]);
+    const sparse *c = &w->acting;
+    V along[N * M], inner[N * M], x[N], *from = along, *to;
+    int i, j, n, e, halvings = 0;
+    double size, scale = 1.0;
+    for (i = 0; i < N; ++i) {
+        x[i] = w->x[k * N + i];
+        for (j = 0; j < M; ++j) {
+            along[i * M + j] = looked_up(w, p->directions, M * N, k, j * N + i);
+        }
     }
-    chain(w, at->u, M);
-    reduce(w, w->before + p->exponentials * ENTRIES, at, Z);
-    memset(at->J, 0, (size_t)N * w->columns * sizeof *at->J);
-    for (k = p->exponentials - 1; k >= 0; --k) {
-        const double first = p->share[2 * k], second = p->share[2 * k + 1];
-        for (i = 0; i < M; ++i) {
-            multiply(w->dE + ((size_t)k * M + i) * ENTRIES, tail, 0, moved);
-            multiply(w->before + k * ENTRIES, moved, 0, column);
-            for (row = 0; row < N; ++row) {
-                V *J = at->J + (size_t)row * w->columns + p->slot[k] * M + i, sum = spread(0.0);
-                for (e = 0; e < ENTRIES; ++e) {
-                    sum += Z[row * ENTRIES + e] * column[e];
-                }
-                J[0] += first * sum;
-                if (second != 0.0) {
-                    J[M] += second * sum;
+    /* terms grow up to e^8 before they fall: that costs three digits of a derivative */
+    for (size = adjoint_action(w, x); size > 8.0; size /= 2.0) {
+        scale /= 2.0;
+        ++halvings;
+    }
+    for (j = 2 * (terms(size) / 2) + 2; j >= 1; --j) { /* Horner's rule; an even number of steps ends in g */
+        const double share = -scale / (j + 1);
+        to = from == inner ? g : inner;
+        for (i = 0; i < N; ++i) {
+            V sum[M];
+#pragma GCC unroll 8
+            for (e = 0; e < M; ++e) {
+                sum[e] = spread(0.0);
+            }
+            for (n = c->first[i]; n < c->first[i + 1]; ++n) {
+                const V entry = w->ad[n], *row = from + c->k[n] * M;
+#pragma GCC unroll 8
+                for (e = 0; e < M; ++e) {
+                    sum[e] += entry * row[e];
                 }
             }
+#pragma GCC unroll 8
+            for (e = 0; e < M; ++e) {
+                to[i * M + e] = along[i * M + e] + share * sum[e];
+            }
         }
-        multiply(w->E + k * ENTRIES, tail, 0, moved);
-        memcpy(tail, moved, sizeof tail);
+        from = to;
+    }
+    if (halvings > 0) {
+        V a[ENTRIES], E[ENTRIES], F[ENTRIES], one[N];
+        for (i = 0; i < N; ++i) {
+            x[i] *= scale;
+        }
+        hat(p, x, a);
+        exponential(a, E);
+        inverse_of(p, x, E, F);
+        for (j = 0; j < halvings; ++j) {
+            for (e = 0; e < M; ++e) {
+                for (i = 0; i < N; ++i) {
+                    one[i] = g[i * M + e];
+                }
+                turn(p, F, E, one);
+                for (i = 0; i < N; ++i) {
+                    g[i * M + e] = 0.5 * (g[i * M + e] + one[i]);
+                }
+            }
+            multiply(E, E, 0, a);
+            memcpy(E, a, sizeof a);
+            multiply(F, F, 0, a);
+            memcpy(F, a, sizeof a);
+        }
     }
 }
 
 /*
- * Derivative z of <R, Y(u)> by the controls, for one matrix R: re tr(dE_k G_k) with G_k = (E_k+1 .. E_K R') R* (L X0 .. E_k-1), and
- * tr(dexp(a; b) G) = tr(b dexp(a; G)), so that one derivative of each exponential serves all controls.
+ * The derivative at what was examined last: with S = E_k+1 .. E_K the end moves by X hat(S^-1 g S), g = E_k^-1 dE_k, and the reduced residual
+ * by G' times that, for Z = (orthonormal rows)' G'.
  */
-static void slope(task *w, const V *u, const V *row, V *z)
+static void differentiate(task *w, point *at)
 {
     const programme *p = w->p;
-    V tail[ENTRIES], moved[ENTRIES], G[ENTRIES], adjoint[ENTRIES], a[ENTRIES], b[M * ENTRIES], E[ENTRIES], turned[ENTRIES];
-    unsigned char there[M * ENTRIES];
-    int k, i, x, y, e;
-    for (x = 0; x < D; ++x) {
-        for (y = 0; y < D; ++y) {
-            adjoint[(y * D + x) * PARTS] = row[(x * D + y) * PARTS];
-#if PARTS == 2
-            adjoint[(y * D + x) * PARTS + 1] = -row[(x * D + y) * PARTS + 1];
-#endif
-        }
-    }
-    for (e = 0; e < ENTRIES; ++e) {
-        tail[e] = spread(p->right[e]);
-    }
-    chain(w, u, 0);
-    multiply(tail, adjoint, 0, moved);
-    memcpy(tail, moved, sizeof tail);
-    memset(z, 0, (size_t)w->columns * sizeof *z);
+    V S[ENTRIES], over[ENTRIES], E[ENTRIES], g[N * M];
+    int k, i, j, c, e;
+    memset(at->J, 0, (size_t)N * w->columns * sizeof *at->J);
     for (k = p->exponentials - 1; k >= 0; --k) {
         const double first = p->share[2 * k], second = p->share[2 * k + 1];
-        multiply(tail, w->before + k * ENTRIES, 0, G);
-        exponent(w, k, u, a, b, there);
-        exponentials(a, 1, G, NULL, E, turned);
+        V *rows = w->bodily + (size_t)k * M * N;
+        turning(w, k, g);
         for (i = 0; i < M; ++i) {
-            V sum = spread(0.0), *to = z + p->slot[k] * M + i;
-            for (x = 0; x < D; ++x) {
-                for (y = 0; y < D; ++y) {
-                    const int place = i * ENTRIES + (x * D + y) * PARTS;
-                    sum += b[place] * turned[(y * D + x) * PARTS];
-#if PARTS == 2
-                    sum -= b[place + 1] * turned[(y * D + x) * PARTS + 1];
-#endif
+            V *row = rows + i * N;
+            for (j = 0; j < N; ++j) {
+                row[j] = g[j * M + i];
+            }
+            if (k < p->exponentials - 1) {
+                turn(p, over, S, row);
+            }
+            for (j = 0; j < N; ++j) {
+                V *J = at->J + (size_t)j * w->columns + p->slot[k] * M + i;
+                J[0] += first * row[j];
+                if (second != 0.0) {
+                    J[M] += second * row[j];
                 }
             }
-            to[0] += first * sum;
-            if (second != 0.0) {
-                to[M] += second * sum;
-            }
         }
-        multiply(w->E + k * ENTRIES, tail, 0, moved);
-        memcpy(tail, moved, sizeof tail);
+        inverse_of(p, w->x + k * N, w->E + k * ENTRIES, E);
+        if (k == p->exponentials - 1) {
+            memcpy(S, w->E + k * ENTRIES, sizeof S);
+            memcpy(over, E, sizeof over);
+        } else {
+            V moved[ENTRIES];
+            multiply(w->E + k * ENTRIES, S, 0, moved);
+            memcpy(S, moved, sizeof S);
+            multiply(over, E, 0, moved);
+            memcpy(over, moved, sizeof over);
+        }
     }
+    for (c = 0; c < w->columns; c += M) {
+        for (i = 0; i < N; ++i) { /* row i of G' has its first entry in column i: rows below are still those of X^-1 dX */
+            V *row = at->J + (size_t)i * w->columns + c, sum[M];
+            for (e = 0; e < M; ++e) {
+                sum[e] = w->G[i * (i + 1) / 2 + i] * row[e];
+            }
+            for (j = i + 1; j < N; ++j) {
+                const V entry = w->G[j * (j + 1) / 2 + i], *below = at->J + (size_t)j * w->columns + c;
+                for (e = 0; e < M; ++e) {
+                    sum[e] += entry * below[e];
+                }
+            }
+            memcpy(row, sum, sizeof sum);
+        }
+    }
+}
+
+/* Residual and derivative at at->u. */
+static void linearise(task *w, point *at)
+{
+    examine(w, at);
+    differentiate(w, at);
 }
 
 #endif

@@ -13,12 +13,47 @@ enum { NEWTON = 6 }; /* proximal steps before the first of Newton's, which far f
 /* A lane whose cost less this many times the gain to expect stays above what another has ended at is left where it is. */
 #define HOPE 2.0
 
+/* Keeps of `bracket` what acts: of sixteen Pauli strings four controls and a drift are five. */
+static void restrict_bracket(task *w, double *memory)
+{
+    const programme *p = w->p;
+    const sparse *all = &p->bracket;
+    double *value = memory;
+    int *j = (int *)(memory + all->first[N]), *k = j + all->first[N];
+    unsigned char there[N] = {0};
+    int i, n, m, row, count = 0;
+    for (row = 0; row < p->rows; ++row) {
+        for (i = 0; i < N; ++i) {
+            there[i] |= p->drifts[row * N + i] != 0.0;
+            for (m = 0; m < M; ++m) {
+                there[i] |= p->directions[(row * M + m) * N + i] != 0.0;
+            }
+        }
+    }
+    for (i = 0; i < N; ++i) {
+        w->first[i] = count;
+        for (n = all->first[i]; n < all->first[i + 1]; ++n) {
+            if (there[all->j[n]]) {
+                value[count] = all->value[n];
+                j[count] = all->j[n];
+                k[count] = all->k[n];
+                ++count;
+            }
+        }
+    }
+    w->first[N] = count;
+    w->acting.first = w->first;
+    w->acting.j = j;
+    w->acting.k = k;
+    w->acting.value = value;
+}
+
 /* Takes the memory that is lent, and the lanes from `first` on; lanes beyond the last repeat it. */
 static void begin(task *w, const programme *p, int lanes, int first, double *memory)
 {
     V *next = (V *)memory;
     const size_t columns = (size_t)p->slots * M, K = (size_t)p->exponentials;
-    V **rows[] = {&w->at.u, &w->trial.u, &w->kept.u, &w->f, &w->t, &w->v, &w->z, &w->g, &w->s, &w->d, &w->x};
+    V **rows[] = {&w->at.u, &w->trial.u, &w->kept.u, &w->f, &w->t, &w->v, &w->z, &w->g, &w->s, &w->d, &w->n};
     V **slopes[] = {&w->at.J, &w->trial.J, &w->kept.J};
     size_t i;
     int l, e;
@@ -33,9 +68,18 @@ static void begin(task *w, const programme *p, int lanes, int first, double *mem
         next += N * columns;
     }
     w->E = next;
-    w->dE = w->E + K * ENTRIES;
-    w->before = w->dE + K * M * ENTRIES;
-    w->Z = w->before + (K + 1) * ENTRIES;
+    w->x = w->E + K * ENTRIES;
+    w->bodily = w->x + K * N;
+    w->moved = w->bodily + K * M * N;
+    w->within = w->moved + K * N;
+    w->twice = w->within + K * M * M;
+    w->Z = w->twice + N * N;
+    w->ad = w->Z + N * ENTRIES;
+    restrict_bracket(w, (double *)(w->ad + p->bracket.first[N]));
+    w->plain = 1;
+    for (e = 0; e < ENTRIES; ++e) {
+        w->plain &= p->right[e] == (e % ((D + 1) * PARTS) == 0 ? 1.0 : 0.0);
+    }
     for (l = 0; l < LANES; ++l) {
         w->lane[l] = first + l < lanes ? first + l : lanes - 1;
         for (e = 0; e < ENTRIES; ++e) {
@@ -48,7 +92,8 @@ static void begin(task *w, const programme *p, int lanes, int first, double *mem
 size_t direct_memory(const programme *p)
 {
     const size_t columns = (size_t)p->slots * M, K = (size_t)p->exponentials;
-    return LANES * ((11 + 3 * N) * columns + (K * (2 + M) + 1 + N) * ENTRIES);
+    return LANES * ((11 + 3 * N) * columns + K * (ENTRIES + (2 + M) * N + M * M) + N * (N + ENTRIES))
+        + (size_t)(LANES + 2) * (size_t)p->bracket.first[N];
 }
 
 static void read_lanes(const task *w, const double *u, V *to)
@@ -163,6 +208,7 @@ void direct_descend(const programme *p, int lanes, double *u, double *size, doub
             gain = SELECT(better, best - found, spread(0.0));
             small = better & NOT(LESS(p->relative * best, gain));
             take(&w, better, &w.kept, &w.at);
+            take_slopes(&w, better, &w.kept, &w.at);
             for (i = 0; i < N; ++i) {
                 dual[i] = SELECT(better, next[i], dual[i]);
             }

@@ -1,4 +1,4 @@
-/* Vectors of doubles, a start in each, matrices of them, and exp with its derivatives: of direct_core.c. */
+/* Vectors of doubles, a start in each, matrices of them, and exp: of direct_core.c. */
 #ifndef DIRECT_LANES_H
 #define DIRECT_LANES_H
 
@@ -98,32 +98,39 @@ static void multiply(const V *a, const V *b, int add, V *c)
     }
 }
 
-/* c += b a for a matrix b of which most entries are zero; `there` tells which are not, or null that none is. */
-static void multiply_sparse(const V *b, const unsigned char *there, const V *a, V *c)
+/* c = a b for a matrix b of plain doubles, given by those of its entries that are not zero. */
+static void multiply_given(const V *a, const int *entry, const double *value, int count, V *c)
 {
-    int i, j, k;
-    if (there == NULL) {
-        multiply(b, a, 1, c);
-        return;
-    }
-    for (i = 0; i < D; ++i) {
-        for (k = 0; k < D; ++k) {
-            const V *row = a + k * D * PARTS;
-            V *sum = c + i * D * PARTS;
-            if (there[(i * D + k) * PARTS]) {
-                const V x = b[(i * D + k) * PARTS];
-                for (j = 0; j < D * PARTS; ++j) {
-                    sum[j] += x * row[j];
-                }
-            }
+    int n, x;
+    memset(c, 0, ENTRIES * sizeof *c);
+    for (n = 0; n < count; ++n) {
+        const int k = entry[n] / (D * PARTS), y = entry[n] % (D * PARTS) / PARTS;
+        const double b = value[n];
+        for (x = 0; x < D; ++x) {
+            const V *from = a + (x * D + k) * PARTS;
+            V *to = c + (x * D + y) * PARTS;
 #if PARTS == 2
-            if (there[(i * D + k) * PARTS + 1]) {
-                const V y = b[(i * D + k) * PARTS + 1];
-                for (j = 0; j < D; ++j) {
-                    sum[2 * j] -= y * row[2 * j + 1];
-                    sum[2 * j + 1] += y * row[2 * j];
-                }
+            if (entry[n] % 2) {
+                to[0] -= b * from[1];
+                to[1] += b * from[0];
+                continue;
             }
+            to[1] += b * from[1];
+#endif
+            to[0] += b * from[0];
+        }
+    }
+}
+
+/* c = a^H */
+static void adjoint(const V *a, V *c)
+{
+    int x, y;
+    for (x = 0; x < D; ++x) {
+        for (y = 0; y < D; ++y) {
+            c[(y * D + x) * PARTS] = a[(x * D + y) * PARTS];
+#if PARTS == 2
+            c[(y * D + x) * PARTS + 1] = -a[(x * D + y) * PARTS + 1];
 #endif
         }
     }
@@ -132,11 +139,11 @@ static void multiply_sparse(const V *b, const unsigned char *there, const V *a, 
 /* Blocks of four terms after the first four that make Taylor's series of exp exact to rounding for matrices of that norm. */
 static int blocks(double size)
 {
-    return size < 0.054 ? 1 : size < 0.28 ? 2 : 3; /* size^(m + 1) / (m + 1)! < 1e-17 for m = 8, 12, 16 = 4 (blocks + 1) */
+    return size < 0.054 ? 1 : size < 0.28 ? 2 : size < 0.7 ? 3 : 4; /* size^(m + 1) / (m + 1)! < 1e-17 for m = 8, 12, 16, 20 */
 }
 
 /* c = one / first! + sum_i powers_i / (first + i)!, i = 1 .. 3, and 4 if `last`. */
-static void combine(const V *const *powers, int last, int first, double one, V *c)
+static void combine(const V *const *powers, int last, int first, V *c)
 {
     double share[5] = {1.0};
     int e, i;
@@ -153,74 +160,54 @@ static void combine(const V *const *powers, int last, int first, double one, V *
         c[e] += share[4] * powers[3][e];
     }
     for (i = 0; i < D; ++i) {
-        c[(i * D + i) * PARTS] += share[0] * one;
+        c[(i * D + i) * PARTS] += share[0];
     }
 }
 
-/*
- * exp(a) and its derivatives along `count` matrices b_i, of which `there` tells the entries that are not zero (all, if null). Taylor's polynomial in blocks of four terms, C_0 + a^4 (C_1 + a^4 (C_2 + ...)), takes a
- * third of the products that Horner's rule does; then squarings. Scales a and b.
- * The derivatives are those of the very operations: of C + a^4 S it is C' + a^4 S' + (a^4)' S, of E <- E E it is E E' + E' E; so they belong
- * to the E that is computed, to rounding, and Newton's steps on it converge. E' goes first, for it needs the E before.
- */
-static void exponentials(V *a, int count, V *b, const unsigned char *there, V *E, V *dE)
+/* The largest of all lanes, at most 1e12: a lane that is lost must not cost the others their time. */
+static double widest(V a)
 {
-    V square = spread(0.0), next[ENTRIES], a2[ENTRIES], a3[ENTRIES], a4[ENTRIES], sums[4][ENTRIES];
-    const V *powers[] = {a, a2, a3, a4};
     double size = 0.0;
-    int e, i, j, l, halvings = 0, last;
-    for (e = 0; e < ENTRIES; ++e) {
-        square += a[e] * a[e];
-    }
+    int l;
     for (l = 0; l < LANES; ++l) {
-        size = fmax(size, sqrt(LANE(square, l)));
+        size = fmax(size, LANE(a, l));
     }
-    size = size < 1e6 ? size : 1e6; /* a lane that is lost must not cost the others their time */
-    while (size > 0.7) {            /* a squaring costs as much as a block, which reaches less than twice as far */
-        size /= 2.0;
+    return size < 1e12 ? size : 1e12;
+}
+
+/*
+ * E = exp(a). Taylor's polynomial in blocks of four terms, C_0 + a^4 (C_1 + a^4 (C_2 + ...)), takes a third of the products that
+ * Horner's rule does; then squarings. How many of both is told by the norm of a^2, which bounds all even powers, and may be far less than
+ * that of a. Scales a.
+ */
+static void exponential(V *a, V *E)
+{
+    V square = spread(0.0), next[ENTRIES], a2[ENTRIES], a3[ENTRIES], a4[ENTRIES];
+    const V *powers[] = {a, a2, a3, a4};
+    double size, scale = 1.0;
+    int e, j, halvings = 0, last;
+    multiply(a, a, 0, a2);
+    for (e = 0; e < ENTRIES; ++e) {
+        square += a2[e] * a2[e];
+    }
+    for (size = sqrt(widest(root(square))); size > 1.3; size /= 2.0) {
+        scale /= 2.0;
         ++halvings;
     }
-    for (e = 0; e < ENTRIES; ++e) {
-        a[e] *= ldexp(1.0, -halvings);
+    for (e = 0; e < ENTRIES && halvings > 0; ++e) {
+        a[e] *= scale;
+        a2[e] *= scale * scale;
     }
-    for (e = 0; e < count * ENTRIES; ++e) {
-        b[e] *= ldexp(1.0, -halvings);
-    }
-    multiply(a, a, 0, a2);
     multiply(a2, a, 0, a3);
     multiply(a2, a2, 0, a4);
     last = blocks(size);
-    combine(powers, 1, 4 * last, 1.0, sums[last]);
+    combine(powers, 1, 4 * last, E);
     for (j = last - 1; j >= 0; --j) {
-        combine(powers, 0, 4 * j, 1.0, sums[j]);
-        multiply(a4, sums[j + 1], 1, sums[j]);
-    }
-    memcpy(E, sums[0], sizeof sums[0]);
-    for (i = 0; i < count; ++i) {
-        const V *along = b + i * ENTRIES;
-        const unsigned char *entries = there == NULL ? NULL : there + i * ENTRIES;
-        V b2[ENTRIES], b3[ENTRIES], b4[ENTRIES], *turned = dE + i * ENTRIES;
-        const V *slopes[] = {along, b2, b3, b4};
-        multiply(a, along, 0, b2);
-        multiply_sparse(along, entries, a, b2);
-        multiply(a, b2, 0, b3);
-        multiply_sparse(along, entries, a2, b3);
-        multiply(a2, b2, 0, b4);
-        multiply(b2, a2, 1, b4);
-        combine(slopes, 1, 4 * last, 0.0, turned);
-        for (j = last - 1; j >= 0; --j) {
-            combine(slopes, 0, 4 * j, 0.0, next);
-            multiply(a4, turned, 1, next);
-            multiply(b4, sums[j + 1], 1, next);
-            memcpy(turned, next, sizeof next);
-        }
+        combine(powers, 0, 4 * j, next);
+        multiply(a4, E, 1, next);
+        memcpy(E, next, sizeof next);
     }
     for (j = 0; j < halvings; ++j) {
-        for (i = 0; i < count; ++i) {
-            multiply(E, dE + i * ENTRIES, 0, next);
-            multiply(dE + i * ENTRIES, E, 1, next);
-            memcpy(dE + i * ENTRIES, next, sizeof next);
-        }
         multiply(E, E, 0, next);
         memcpy(E, next, sizeof next);
     }

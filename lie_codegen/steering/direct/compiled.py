@@ -47,8 +47,14 @@ def machine(group: MatrixGroup, controls: int) -> Machine:
     return (
         NumpySearch()
         if library is None
-        else CompiledSearch(load_library(library), group.degree, parts, group.dim, controls)
+        else CompiledSearch(load_library(library), group, controls)
     )
+
+
+class _Sparse(ctypes.Structure):
+    """As `sparse` in the C text."""
+
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("first", "j", "k", "value"))
 
 
 class _Programme(ctypes.Structure):
@@ -59,16 +65,18 @@ class _Programme(ctypes.Structure):
             (name, ctypes.c_int)
             for name in (
                 "exponentials", "slots", "rows", "entry_lanes", "free_phase", "fuel", "reach_iterations", "descend_iterations", "wanted",
+                "unitary",
             )
         ],
         *[(name, ctypes.c_double) for name in ("enough", "damping", "relative")],
         *[
             (name, ctypes.c_void_p)
             for name in (
-                "start", "right", "value", "basis", "drifts", "directions", "share", "low", "high", "weight", "mass",
+                "start", "right", "value", "drifts", "directions", "share", "low", "high", "weight", "mass",
                 "entry", "slot",
             )
         ],
+        *[(name, _Sparse) for name in ("basis", "matrix", "dual", "bracket")],
     )  # fmt: skip
 
 
@@ -81,10 +89,22 @@ class CompiledSearch:
 
     compiled = True
 
-    def __init__(self, library: ctypes.CDLL, degree: int, parts: int, dim: int, controls: int) -> None:
-        self._degree, self._dim = degree, dim
-        self._kind: Any = complex if parts == 2 else float
-        self._products = (1 + controls) * degree**3 * parts**2
+    def __init__(self, library: ctypes.CDLL, group: MatrixGroup, controls: int) -> None:
+        self._degree, self._dim = group.degree, group.dim
+        self._kind: Any = complex if group.is_complex else float
+        self._products = (1 + controls) * group.degree**3 * (4 if group.is_complex else 1)
+        rows = _numbers(np.ascontiguousarray(group.basis, dtype=self._kind)).reshape(group.dim, -1)
+        self._dual = np.linalg.pinv(rows).T
+        # entries that are rounding would cost as much as others
+        self._dual[np.abs(self._dual) < 1e-14 * np.max(np.abs(self._dual))] = 0.0
+        tables = {
+            "basis": rows[:, None],
+            "matrix": rows.T[:, None],
+            "dual": self._dual[:, None],
+            "bracket": np.moveaxis(group.algebra.structure_constants, 2, 0),
+        }
+        self._tables = {name: _Table(table) for name, table in tables.items()}
+        self._unitary = bool(np.allclose(group.basis, -np.conj(np.swapaxes(group.basis, 1, 2)), rtol=0, atol=1e-14))
         void, count = ctypes.c_void_p, ctypes.c_int
         self._memory = library["direct_memory"]
         self._memory.argtypes, self._memory.restype = (void,), ctypes.c_size_t
@@ -141,7 +161,7 @@ class CompiledSearch:
             "start": self._square(goal.left @ p.start),
             "right": self._square(goal.right),
             "value": self._square(goal.value),
-            **{name: self._entries(getattr(p, name)) for name in ("basis", "drifts", "directions")},
+            **{name: self._coordinates(getattr(p, name)) for name in ("drifts", "directions")},
             **{name: _copied(getattr(p, name)) for name in ("share", "low", "high", "weight", "mass")},
             "entry": np.ascontiguousarray(p.entry, dtype=np.intc),
             "slot": np.ascontiguousarray(p.slot, dtype=np.intc),
@@ -159,18 +179,41 @@ class CompiledSearch:
             enough=settings.enough,
             damping=settings.damping,
             relative=settings.relative,
+            unitary=int(self._unitary),
             **{name: array.ctypes.data for name, array in arrays.items()},
+            **{name: table.record for name, table in self._tables.items()},
         )
         return record, arrays
 
-    def _entries(self, matrices: Array) -> Array:
-        return np.ascontiguousarray(matrices, dtype=self._kind)
+    def _coordinates(self, matrices: Array) -> Array:
+        """(..., d, d) matrices of the algebra -> (..., n)."""
+        whole = np.ascontiguousarray(matrices, dtype=self._kind)
+        return np.ascontiguousarray(_numbers(whole).reshape(*whole.shape[:-2], -1) @ self._dual.T)
 
     def _square(self, matrices: Array) -> Array:
         d = self._degree
         padded = np.zeros((*matrices.shape[:-2], d, d), dtype=self._kind)
         padded[..., : matrices.shape[-2], : matrices.shape[-1]] = matrices
         return padded
+
+
+class _Table:
+    """The entries (i, j, k) of a table that are not zero, by i, as the C text reads them."""
+
+    def __init__(self, table: Array) -> None:
+        i, j, k = np.nonzero(table)
+        self._arrays = {
+            "first": np.searchsorted(i, np.arange(len(table) + 1)).astype(np.intc),
+            "j": j.astype(np.intc),
+            "k": k.astype(np.intc),
+            "value": np.ascontiguousarray(table[i, j, k], dtype=float),
+        }
+        self.record = _Sparse(**{name: array.ctypes.data for name, array in self._arrays.items()})
+
+
+def _numbers(matrices: Array) -> Array:
+    """Complex entries as pairs of numbers, real ones as they are."""
+    return matrices.view(float) if np.iscomplexobj(matrices) else matrices
 
 
 def _copied(values: Array) -> Array:
