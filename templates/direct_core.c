@@ -181,7 +181,6 @@ void direct_descend(const programme *p, int lanes, double *u, double *size, doub
         Mask open = everywhere();
         begin(&w, p, lanes, first, memory);
         read_lanes(&w, u, w.kept.u);
-        linearise(&w, &w.kept);
         best = objective(&w, w.kept.u);
         for (i = 0; i < N; ++i) {
             dual[i] = spread(0.0);
@@ -194,6 +193,7 @@ void direct_descend(const programme *p, int lanes, double *u, double *size, doub
             V found, gain, expected = spread(INFINITY);
             Mask better, small;
             memcpy(next, dual, sizeof next);
+            linearise(&w, &w.kept);
             if (curved) {
                 expected = newton(&w, &w.kept, rho, sigma, next, w.v);
             } else {
@@ -202,13 +202,12 @@ void direct_descend(const programme *p, int lanes, double *u, double *size, doub
             for (c = 0; c < w.columns; ++c) {
                 w.at.u[c] = least(largest(w.v[c], spread(p->low[c])), spread(p->high[c]));
             }
-            restore(&w, &w.at, open);
+            restore(&w, &w.at, w.kept.J, open);
             found = objective(&w, w.at.u);
             better = open & LESS(w.at.size, spread(enough)) & LESS(found, best);
             gain = SELECT(better, best - found, spread(0.0));
             small = better & NOT(LESS(p->relative * best, gain));
             take(&w, better, &w.kept, &w.at);
-            take_slopes(&w, better, &w.kept, &w.at);
             for (i = 0; i < N; ++i) {
                 dual[i] = SELECT(better, next[i], dual[i]);
             }

@@ -12,6 +12,8 @@ enum {
 };
 /* Conjugate gradients end when the square of the slope has fallen to this: the step is restored to the goal and repeated anyhow. */
 #define ENOUGH_CURVED 1e-2
+/* Residual up to which controls are so near to those before that the derivative there serves. */
+#define NEARBY 1e-2
 
 /* The lower triangle of J diag(f) J'. */
 static void gram(const task *w, const V *J, const V *f, V *t, V *A)
@@ -182,16 +184,23 @@ static void arrive(task *w, point *at, Mask active, int iterations, double enoug
 }
 
 /*
- * Undamped steps that bring controls near the goal back to it, in lanes of `active`. The derivative is kept as long as the residual
- * falls to a quarter, since a residual alone costs an eighth; where it does not fall with a new derivative, a lane gives up.
+ * Undamped steps that bring controls near the goal back to it, in lanes of `active`, with the derivative J that is known nearby: it is kept as
+ * long as it gets there in three more steps, since a residual alone costs a third; where the residual does not fall with a new
+ * derivative, a lane gives up. Leaves no derivative.
  */
-static void restore(task *w, point *at, Mask active)
+static void restore(task *w, point *at, const V *J, Mask active)
 {
-    int step, i, c, fresh = 1;
-    linearise(w, at);
+    int step, i, c, fresh = 0;
+    memcpy(at->J, J, (size_t)N * w->columns * sizeof *J);
+    examine(w, at);
+    if (any(active & LESS(spread(NEARBY), at->size))) {
+        differentiate(w, at);
+        fresh = 1;
+    }
     for (step = 0; step < RESTORE; ++step) {
         const Mask open = active & LESS(spread(w->p->enough), at->size);
         Mask better;
+        V rate;
         int slow;
         if (!any(open)) {
             break;
@@ -199,7 +208,8 @@ static void restore(task *w, point *at, Mask active)
         damped_step(w, at, spread(1e-9), w->trial.u);
         examine(w, &w->trial);
         better = open & LESS(w->trial.size, at->size);
-        slow = any(open & NOT(LESS(w->trial.size, 0.25 * at->size)));
+        rate = w->trial.size / at->size;
+        slow = any(open & NOT(LESS(w->trial.size * rate * rate * rate, spread(w->p->enough))));
         active &= NOT(open) | better | (fresh ? NOT(open) : open);
         at->size = SELECT(better, w->trial.size, at->size);
         for (i = 0; i < N; ++i) {
@@ -209,12 +219,11 @@ static void restore(task *w, point *at, Mask active)
             at->u[c] = SELECT(better, w->trial.u[c], at->u[c]);
         }
         fresh = slow;
-        if (slow) {
+        if (slow && any(open & NOT(better))) {
             linearise(w, at);
+        } else if (slow) {
+            differentiate(w, at); /* the trial was at the same controls, in all lanes that still move */
         }
-    }
-    if (!fresh) {
-        linearise(w, at);
     }
 }
 
@@ -530,7 +539,7 @@ static void bend(task *w, const V *d, V *z)
 /*
  * Newton's step of the least energy on the goal, from controls u that reach it: the proximal step first, which tells which
  * controls go to their bounds and what the multipliers y are, then conjugate gradients on the Lagrange function's second
- * derivative in the others, on the linearised goal. Where the curvature is negative they end. Returns the gain to expect.
+ * derivative in the others, on the linearised goal. What was differentiated last is at. Where the curvature is negative they end. Returns the gain to expect.
  */
 static V newton(task *w, point *at, V rho, V sigma, V *y, V *v)
 {
@@ -539,7 +548,6 @@ static V newton(task *w, point *at, V rho, V sigma, V *y, V *v)
     V A[PACKED], inverse[N], row[ENTRIES], trace = zero, first, size, slack[N], gain = zero;
     Mask open;
     int c, i, j, e, step;
-    linearise(w, at); /* for all that belongs to J */
     proximal(w, at, rho, y, v);
     for (c = 0; c < w->columns; ++c) {
         w->f[c] = SELECT(LESS(zero, w->f[c]), spread(1.0 / p->mass[c / M]), zero);
