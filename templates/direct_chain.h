@@ -60,6 +60,7 @@ typedef struct {
     V *moved;           /* (exponentials, N) */
     V *Z;               /* (N, ENTRIES) derivatives of the residual along the basis */
     V end[ENTRIES];     /* L X */
+    V ahead[2];         /* <value, L X R> as re, im, where the phase is free */
     V G[PACKED], over[N]; /* Cholesky factor of Z'Z, the inverse of its diagonal */
     point at, trial, kept;
 } task;
@@ -188,6 +189,8 @@ static void reduce(task *w, point *at)
             overlap_r += value[e] * here[e] + value[e + 1] * here[e + 1];
             overlap_i += value[e] * here[e + 1] - value[e + 1] * here[e];
         }
+        w->ahead[0] = overlap_r;
+        w->ahead[1] = overlap_i;
         scale = 1.0 / root(overlap_r * overlap_r + overlap_i * overlap_i + 1e-300);
         c = overlap_r * scale;
         s = overlap_i * scale;

@@ -123,8 +123,11 @@ static Mask everywhere(void)
     return LESS(spread(0.0), spread(1.0));
 }
 
-/* Stage 1: from the controls u (lanes, slots, M) to controls that reach the goal; the residual each lane is left with. */
-void direct_reach(const programme *p, int lanes, double *u, double *size, int *used, double *memory)
+/*
+ * Stage 1: from the controls u (lanes, slots, M) to controls that reach the goal; the residual each lane is left with, and by what phase its
+ * end is ahead of the value, where that is free.
+ */
+void direct_reach(const programme *p, int lanes, double *u, double *size, double *phase, int *used, double *memory)
 {
     int first, l;
     for (first = 0; first < lanes; first += LANES) {
@@ -134,8 +137,14 @@ void direct_reach(const programme *p, int lanes, double *u, double *size, int *u
         read_lanes(&w, u, w.at.u);
         arrive(&w, &w.at, everywhere(), p->reach_iterations, p->enough, p->damping, p->wanted, steps);
         write_lanes(&w, lanes, first, &w.at, u, size);
+        if (p->free_phase) {
+            examine(&w, &w.at);
+        }
         for (l = 0; l < LANES && first + l < lanes; ++l) {
             used[first + l] = steps[l];
+            if (p->free_phase) {
+                phase[first + l] = atan2(LANE(w.ahead[1], l), LANE(w.ahead[0], l));
+            }
         }
     }
 }

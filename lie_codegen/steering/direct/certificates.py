@@ -76,9 +76,11 @@ def _whole(task: Manoeuvre, speeds: Array) -> Certificate | None:
     relative = np.linalg.solve(np.broadcast_to(task.system.start, end.elements.shape), end.elements)
     angles = np.abs(np.angle(np.linalg.eigvals(relative)))
     best: Certificate | None = None
+    # the singular values of an anti-Hermitian matrix are those of a Hermitian one, its eigenvalues
+    sizes = np.abs(np.linalg.eigvalsh(1j * speeds))
     for need, most in (
-        (np.min(np.linalg.norm(angles, axis=1)), np.max(np.linalg.norm(speeds, axis=(1, 2)))),
-        (np.min(np.max(angles, axis=1)), np.max(np.linalg.norm(speeds, ord=2, axis=(1, 2)))),
+        (np.min(np.linalg.norm(angles, axis=1)), np.max(np.linalg.norm(sizes, axis=1))),
+        (np.min(np.max(angles, axis=1)), np.max(sizes)),
     ):
         best = _stronger(best, _proof("distance", float(need), float(most) * task.duration))
     return best

@@ -100,6 +100,14 @@ def degree(size: float) -> int:
     return max(2, j)
 
 
+def phase_ahead(programme: Programme, goal: Goal, u: Array) -> Array:
+    """(L,) the phase of <value, left X right> at the end of controls u, zero where the goal leaves none free."""
+    if not goal.free_phase:
+        return np.zeros(len(u))
+    here = goal.left @ end(programme, u) @ goal.right
+    return np.angle(np.sum(np.conj(goal.value) * here, axis=(1, 2)))
+
+
 def end(programme: Programme, u: Array) -> Array:
     """X (L, d, d) at the end of the chain."""
     lanes, slots, _ = u.shape

@@ -109,7 +109,7 @@ class CompiledSearch:
         self._memory = library["direct_memory"]
         self._memory.argtypes, self._memory.restype = (void,), ctypes.c_size_t
         self._functions = {}
-        for name, arrays in (("reach", 4), ("linearise", 5), ("descend", 6)):
+        for name, arrays in (("reach", 5), ("linearise", 5), ("descend", 6)):
             function = library[f"direct_{name}"]
             function.argtypes, function.restype = (void, count, *[void] * arrays), None
             self._functions[name] = function
@@ -117,15 +117,16 @@ class CompiledSearch:
     def reach(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
         """See `Machine`."""
         controls, size, used = _copied(u), np.empty(len(u)), np.zeros(len(u), np.intc)
-        self._run("reach", programme, goal, settings, controls, size, used)
-        return Reached(controls, size, np.full(len(u), np.nan), np.zeros((len(u), self._dim)), used)
+        phase = np.zeros(len(u))
+        self._run("reach", programme, goal, settings, controls, size, phase, used)
+        return Reached(controls, size, np.full(len(u), np.nan), np.zeros((len(u), self._dim)), used, phase)
 
     def descend(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
         """See `Machine`."""
         controls, size, used = _copied(u), np.empty(len(u)), np.zeros(len(u), np.intc)
         cost, multipliers = np.empty(len(u)), np.zeros((len(u), self._dim))
         self._run("descend", programme, goal, settings, controls, size, cost, multipliers, used)
-        return Reached(controls, size, cost, multipliers, used)
+        return Reached(controls, size, cost, multipliers, used, np.zeros(len(u)))
 
     def linearise(self, programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:
         """See `Machine`."""

@@ -21,8 +21,10 @@ def end_reached(drive: Drive) -> Array:
     """(d, d) where the true system ends under the inputs of `drive`, drift included."""
     if not _one_exponential(drive):
         return np.asarray(states_reached(drive)[1][-1])
-    knots, system = drive.inputs.knots, drive.system
-    E = _exponentials(drive, knots[:-1], np.diff(knots))
+    inputs, system = drive.inputs, drive.system
+    now = np.zeros(1)
+    a = system.drift.at(now) + inputs.first @ system.directions_at(now)[0]
+    E = expm(system.group.hat(np.diff(inputs.knots)[:, None] * a))
     # neighbours are multiplied side by side: six products of arrays for 48 pieces, not 48 of matrices
     while len(E) > 1:
         pairs = E[: len(E) - len(E) % 2].reshape(-1, 2, *E.shape[1:])

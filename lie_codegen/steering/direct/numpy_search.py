@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
-from lie_codegen.steering.direct.chain import linearise
+from lie_codegen.steering.direct.chain import linearise, phase_ahead
 from lie_codegen.steering.direct.programme import Goal, Programme, Reached, Settings, chosen
 
 _LEAST, _MOST = 1e-13, 1e8
@@ -80,7 +80,8 @@ class NumpySearch:
     def reach(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
         """See `Machine`."""
         found = reach(_look(programme, goal), Box.of(programme), u.reshape(len(u), -1), settings)
-        return replace(found, u=found.u.reshape(u.shape))
+        controls = found.u.reshape(u.shape)
+        return replace(found, u=controls, phase=phase_ahead(programme, goal, controls))
 
     def descend(self, programme: Programme, goal: Goal, u: Array, settings: Settings) -> Reached:
         """See `Machine`."""
@@ -93,7 +94,7 @@ def reach(look: Look, box: Box, u: Array, settings: Settings) -> Reached:
     rows = np.arange(len(u))
     at = look(rows, np.clip(u, box.low, box.high))
     used = _arrive(look, rows, box, at, settings.reach_iterations, settings.enough, settings.damping, settings.wanted)
-    return Reached(at.u, at.size, box.objective(settings.fuel, at.u), np.zeros_like(at.r), used)
+    return Reached(at.u, at.size, box.objective(settings.fuel, at.u), np.zeros_like(at.r), used, np.zeros(len(used)))
 
 
 def descend(look: Look, box: Box, u: Array, settings: Settings) -> Reached:
@@ -121,7 +122,7 @@ def descend(look: Look, box: Box, u: Array, settings: Settings) -> Reached:
         at.take(rows, trial, better)
         y[rows], best[rows] = multipliers[better], cost[better]
         used[act] += 1
-    return Reached(at.u, at.size, best, y, used)
+    return Reached(at.u, at.size, best, y, used, np.zeros(len(used)))
 
 
 def _look(p: Programme, goal: Goal) -> Look:

@@ -93,6 +93,7 @@ class Reached:
         cost: (lanes,) objective; of a descent only.
         multipliers: (lanes, n) of the reduced residual; of a descent only.
         used: (lanes,) iterations.
+        phase: (lanes,) rad by which the ends are ahead of the values of a goal with a free phase; of reaching only.
     """
 
     u: Array
@@ -100,6 +101,7 @@ class Reached:
     cost: Array
     multipliers: Array
     used: Array
+    phase: Array
 
 
 class Machine(Protocol):

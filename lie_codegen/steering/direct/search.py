@@ -9,7 +9,6 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre
-from lie_codegen.steering.direct.chain import end as chain_end
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
 from lie_codegen.steering.direct.starts import starts, with_free_slots
 
@@ -103,7 +102,7 @@ def search(
         free = len(task.end.phases) > 1 and (settings.descend_iterations == 0 or round_ % 2 == 1)
         found = machine.reach(programme, replace(goal, free_phase=free), u, patient)
         if free:
-            variant = _nearest_variant(task, programme, found.u)
+            variant = _nearest_variant(task, variant, found.phase)
         total += len(u)
         there = found.size <= enough
         tried.append(f"round {round_ + 1}, seed {budget.seed}: {int(np.sum(there))} of {len(u)} starts reach the goal")
@@ -138,12 +137,12 @@ def search(
     return _best(lower, variant[arrived], total, reached, tuple(tried))
 
 
-def _nearest_variant(task: Manoeuvre, programme: Programme, u: Array) -> Array:
-    """(lanes,) the variant of the goal that each lane ends nearest to: on SU(d) a gate that is met up to a phase is met at one of them."""
-    end = task.goal(np.arange(len(task.end.values)))
-    ends = end.left @ chain_end(programme, u) @ end.right
-    away = np.linalg.norm((ends[:, None] - end.value).reshape(len(u), len(end.value), -1), axis=2)
-    return np.asarray(np.argmin(away, axis=1))
+def _nearest_variant(task: Manoeuvre, variant: Array, ahead: Array) -> Array:
+    """(lanes,) the variant of the goal that each lane ends nearest to, `ahead` of its own by a phase: on SU(d) a gate that is met up to a
+    phase is met at one of them, and of all multiples of a gate the nearest in phase is the nearest."""
+    phases = np.array(task.end.phases)
+    away = np.cos((phases[variant] + ahead)[:, None] - phases)
+    return np.asarray(np.argmax(away, axis=1))
 
 
 def threshold(task: Manoeuvre, settings: Settings) -> float:

@@ -43,6 +43,8 @@ def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> 
 def with_free_slots(task: Manoeuvre, u: Array, seed: int) -> Array:
     """The controls (lanes, S, m) with slots for the free motions of the goal: none in the first lane, then any."""
     before, after = task.free_slots
+    if before + after == 0:
+        return u
     rng = np.random.default_rng([seed, before, after])
     free = rng.uniform(-np.pi, np.pi, (len(u), before + after, u.shape[2]))
     free[0] = 0
@@ -51,6 +53,10 @@ def with_free_slots(task: Manoeuvre, u: Array, seed: int) -> Array:
 
 def _box(task: Manoeuvre) -> tuple[Array, Array]:
     """(m,) middle and half width of the limits; where there is none, what reaches the target in the time, doubled."""
+    # a target is at least 2 pi away here: limits that are not wide for that are not for any
+    least = 4 * np.pi / task.duration
+    if np.all(task.low >= -10 * least) and np.all(task.high <= 10 * least):
+        return (task.low + task.high) / 2, (task.high - task.low) / 2
     reach = 2 * np.pi
     elements = task.end.elements
     if elements is not None:
