@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,8 +35,8 @@ def gate_end(group: MatrixGroup, given: ArrayLike, levels: Sequence[int] | None,
     gate = _unitary(gate, len(kept), where)
     if len(kept) < d:
         return _block_end(group, gate, kept, where)
-    whole = group.project(1j * np.eye(d))
-    if np.allclose(group.hat(whole), 1j * np.eye(d), atol=1e-12):
+    whole = _whole_phase(group)
+    if whole is not None:
         return element_end(group, gate[None], none, whole[None])
     phases = (-np.angle(np.linalg.det(gate)) + 2 * np.pi * np.arange(d)) / d
     elements = np.exp(1j * phases)[:, None, None] * gate
@@ -46,6 +47,14 @@ def gate_end(group: MatrixGroup, given: ArrayLike, levels: Sequence[int] | None,
         phases, elements = phases[fits], elements[fits]
     turns = tuple(float(phase) for phase in np.mod(phases, 2 * np.pi))
     return element_end(group, elements, none, none, turns)
+
+
+@lru_cache(maxsize=64)
+def _whole_phase(group: MatrixGroup) -> Array | None:
+    """(n,) coordinates of i times the identity, where the algebra has it."""
+    phase = 1j * np.eye(group.degree)
+    whole = group.project(phase)
+    return whole if np.allclose(group.hat(whole), phase, atol=1e-12) else None
 
 
 def _fits(group: MatrixGroup, element: Array, where: str) -> bool:

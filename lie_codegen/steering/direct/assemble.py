@@ -148,21 +148,22 @@ def programme_of(
     group, n = system.group, len(mass)
     drifts, directions, entry = table
     start = np.eye(group.degree, dtype=group.basis.dtype) if system.right else system.start
+    low, high, weight = (np.tile(each, (n, 1)) for each in (task.low, task.high, task.weights))
+    if not len(task.end.before) and not len(task.end.after):
+        return Programme(group.basis, start, drifts, directions, entry[None], slot, share, low, high, weight, mass)
     # a left-invariant system reads L X0 E_1 ...: a motion before X0 is one after it, turned by X0; and so on the other side
     before = _turned(task.end.before, group, np.linalg.inv(system.start), not system.right)
     after = _turned(task.end.after, group, system.start, system.right)
     first, last = (_free_rows(group, rows, m) for rows in (before, after))
     extra = [*first, *last]
-    if extra:
-        zero = np.zeros((len(extra), group.degree, group.degree), group.basis.dtype)
-        rows = len(drifts)
-        drifts = np.concatenate([drifts, zero])
-        directions = np.concatenate([directions, np.array(extra)])
-        entry = np.concatenate([rows + np.arange(len(first)), entry, rows + len(first) + np.arange(len(last))])
-        whole = np.tile([1.0, 0.0], (1, 1))
-        slot = np.concatenate([np.arange(len(first)), len(first) + slot, len(first) + n + np.arange(len(last))])
-        share = np.concatenate([np.repeat(whole, len(first), 0), share, np.repeat(whole, len(last), 0)])
-    low, high, weight = (np.tile(each, (n, 1)) for each in (task.low, task.high, task.weights))
+    zero = np.zeros((len(extra), group.degree, group.degree), group.basis.dtype)
+    rows = len(drifts)
+    drifts = np.concatenate([drifts, zero])
+    directions = np.concatenate([directions, np.array(extra)])
+    entry = np.concatenate([rows + np.arange(len(first)), entry, rows + len(first) + np.arange(len(last))])
+    whole = np.tile([1.0, 0.0], (1, 1))
+    slot = np.concatenate([np.arange(len(first)), len(first) + slot, len(first) + n + np.arange(len(last))])
+    share = np.concatenate([np.repeat(whole, len(first), 0), share, np.repeat(whole, len(last), 0)])
     open_ends = [np.full((len(side), m), np.inf) for side in (first, last)]
     return Programme(
         basis=group.basis,

@@ -51,38 +51,69 @@ class Certificate:
 
 def certificate(task: Manoeuvre) -> Certificate | None:
     """A proof that the goal cannot be reached, the strongest found; None where there is none."""
-    speeds = _vertices(task)
-    if speeds is None:
+    box = _box(task)
+    if box is None:
         return None
-    found = [each for each in (_whole(task, speeds), _columns(task, speeds), _along(task)) if each is not None]
+    found = [each for each in (_whole(task, box), _columns(task, box.speeds), _along(task)) if each is not None]
     return max(found, key=lambda each: each.need / max(each.most, 1e-300), default=None)
 
 
-def _vertices(task: Manoeuvre) -> Array | None:
-    """hat of the velocity at the vertices of the box, (2^m, d, d); None where it has none, too many, or depends on time."""
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """The vertices of a box of controls.
+
+    Attributes:
+        speeds: (2^m, d, d) hat of the velocity there.
+        whole, widest: the largest Frobenius and spectral norm of these, where all velocities are anti-Hermitian.
+    """
+
+    speeds: Array
+    whole: float | None
+    widest: float | None
+
+
+def _box(task: Manoeuvre) -> _Box | None:
+    """The box of the controls; None where it has no vertices, too many, or depends on time."""
     if not task.system.steady or task.controls > _MOST_CONTROLS:
         return None
     if not np.all(np.isfinite(task.low)) or not np.all(np.isfinite(task.high)):
         return None
-    corners = np.array(list(product(*zip(task.low, task.high, strict=True))))
-    return np.asarray(task.system.group.hat(task.system.velocity(np.zeros(len(corners)), corners)))
+    system, now = task.system, np.zeros(1)
+    return _vertices(
+        system.group,
+        system.directions_at(now).tobytes(),
+        system.drift.at(now).tobytes(),
+        task.low.tobytes(),
+        task.high.tobytes(),
+    )
 
 
-def _whole(task: Manoeuvre, speeds: Array) -> Certificate | None:
+@lru_cache(maxsize=16)
+def _vertices(group: MatrixGroup, directions: bytes, drift: bytes, low: bytes, high: bytes) -> _Box:
+    """The box of (m, n) directions and an (n,) drift: the same for every target of a system."""
+    corners = np.array(list(product(*zip(np.frombuffer(low), np.frombuffer(high), strict=True))))
+    velocities = np.frombuffer(drift) + corners @ np.frombuffer(directions).reshape(-1, group.dim)
+    speeds = np.asarray(group.hat(velocities))
+    if not _anti_hermitian(group):
+        return _Box(speeds, None, None)
+    # the singular values of an anti-Hermitian matrix are those of a Hermitian one, its eigenvalues
+    sizes = np.abs(np.linalg.eigvalsh(1j * speeds))
+    return _Box(speeds, float(np.max(np.linalg.norm(sizes, axis=1))), float(np.max(sizes)))
+
+
+def _whole(task: Manoeuvre, box: _Box) -> Certificate | None:
     """By a bi-invariant norm; of every variant of the goal, or there is no proof."""
     end = task.end
-    if end.elements is None or len(end.before) or len(end.after) or not _anti_hermitian(task.system.group):
+    if end.elements is None or len(end.before) or len(end.after) or box.whole is None or box.widest is None:
         return None
     relative = np.linalg.solve(np.broadcast_to(task.system.start, end.elements.shape), end.elements)
     angles = np.abs(np.angle(np.linalg.eigvals(relative)))
     best: Certificate | None = None
-    # the singular values of an anti-Hermitian matrix are those of a Hermitian one, its eigenvalues
-    sizes = np.abs(np.linalg.eigvalsh(1j * speeds))
     for need, most in (
-        (np.min(np.linalg.norm(angles, axis=1)), np.max(np.linalg.norm(sizes, axis=1))),
-        (np.min(np.max(angles, axis=1)), np.max(sizes)),
+        (np.min(np.linalg.norm(angles, axis=1)), box.whole),
+        (np.min(np.max(angles, axis=1)), box.widest),
     ):
-        best = _stronger(best, _proof("distance", float(need), float(most) * task.duration))
+        best = _stronger(best, _proof("distance", float(need), most * task.duration))
     return best
 
 

@@ -127,6 +127,9 @@ class System(Value):
 
     def directions_at(self, t: Array) -> Array:
         """(k,) times -> (k, m, n)."""
+        constants = [each.constant for each in self.directions]
+        if all(each is not None for each in constants):
+            return np.broadcast_to(np.array(constants), (len(t), len(constants), self.group.dim))
         return np.stack([each.at(t) for each in self.directions], axis=1)
 
     def velocity(self, t: Array, inputs: Array) -> Array:
