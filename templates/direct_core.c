@@ -7,7 +7,7 @@
  * group (D, PARTS, N, M) stand in direct_sizes.h; everything else arrives at run time, so that one library serves every
  * problem of a group. Nothing is allocated here: the caller lends the memory.
  */
-#include "direct_steps.h"
+#include "direct_newton.h"
 
 enum { NEWTON = 6 }; /* proximal steps before the first of Newton's, which far from the end lead anywhere */
 /* A lane whose cost less this many times the gain to expect stays above what another has ended at is left where it is. */

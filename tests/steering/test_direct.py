@@ -291,6 +291,27 @@ def test_derivatives_are_exact_and_the_two_machines_agree(name: str, linear: boo
         np.testing.assert_allclose(J[:, :, slot * 2 + i], slope, atol=1e-8)
 
 
+def test_a_phase_that_is_free_follows_the_controls() -> None:
+    """J'r is the slope of |X - e^(i f) U|^2 / 2 with the best f, far from the goal too; the phase told is that f."""
+    two = lc.pauli(2)
+    rows = [two.labels.index(label) for label in ("XI", "YI", "IX", "IY")]
+    drift = np.eye(15)[two.labels.index("ZZ")]
+    task = manoeuvre(two, lc.UpToPhase(CNOT), list(np.eye(15)[rows]), 6.0, drift, 4, None, None, "left")
+    programme, goal = constant_pieces(task, 6), replace(task.goal(np.zeros(2, int)), free_phase=True)
+    u = np.random.default_rng(4).uniform(-2, 2, (2, 6, 4))
+    for solver in (machine(two, 4), NumpySearch()):
+        _, r, J = solver.linearise(programme, goal, u)
+        slope = np.einsum("lnc,ln->lc", J, r).reshape(u.shape)
+        for slot, i in ((0, 0), (3, 1), (5, 3)):
+            e = 1e-5 * np.eye(24)[4 * slot + i].reshape(6, 4)
+            up, down = (solver.linearise(programme, goal, u + sign * e)[0] for sign in (1, -1))
+            np.testing.assert_allclose(slope[:, slot, i], (up**2 - down**2) / 4e-5, atol=1e-8)
+        found = solver.reach(programme, goal, u, replace(Settings(), reach_iterations=1))
+        X = chain_end(programme, found.u)
+        ahead = np.angle(np.sum(np.conj(goal.value) * X, axis=(1, 2)))
+        np.testing.assert_allclose(found.phase, ahead, atol=1e-9)
+
+
 def test_numpy_finds_what_the_compiled_search_finds() -> None:
     task = _task("so3", ("w1", "w2"), drift=[0, 0, 0.5])
     programme = constant_pieces(task, 24)

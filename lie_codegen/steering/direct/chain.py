@@ -32,6 +32,7 @@ def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array,
     # dX/du_k = E_1 .. E_k-1 (dE_k/du_k) E_k+1 .. E_K: with the products from both ends one matrix product a control
     moved = (goal.left @ before)[:, :, None] @ dE @ (after @ goal.right)[:, :, None]
     r, reduce = residual(p.basis, goal, X)
+    moved = _following(goal, goal.left @ X @ goal.right, moved)[1]
     rows = np.einsum("lnq,lkiq->lnki", reduce, flat(moved))
     J = np.zeros((slots, lanes, rows.shape[1], m))
     moving = np.moveaxis(rows, 2, 0)
@@ -49,20 +50,27 @@ def residual(basis: Array, goal: Goal, X: Array) -> tuple[Array, Array]:
     """
     here = goal.left @ X @ goal.right
     slopes = (goal.left @ X)[:, None] @ basis @ goal.right
-    value = goal.value
-    if goal.free_phase:
-        # |X - e^(i phi) U| is least at the phase of <U, X>; as X moves that phase turns too, at `rate`, and so does what X is compared with
-        overlap = np.sum(np.conj(value) * here, axis=(1, 2))
-        turn = overlap / np.abs(overlap)
-        value = turn[:, None, None] * value
-        rate = np.imag(np.sum(np.conj(goal.value)[:, None] * slopes, axis=(2, 3)) / overlap[:, None])
-        slopes = slopes - 1j * rate[..., None, None] * value[:, None]
+    value, slopes = _following(goal, here, slopes)
     D = flat(slopes)
     gram = D @ np.swapaxes(D, 1, 2)
     n = gram.shape[1]
     # motions that the goal leaves free change nothing: without the shift the factor would not exist
     gram = gram + (1e-13 * np.trace(gram, axis1=1, axis2=2) / n + 1e-300)[:, None, None] * np.eye(n)
     return flat(here - value), np.linalg.solve(np.linalg.cholesky(gram), D)
+
+
+def _following(goal: Goal, here: Array, slopes: Array) -> tuple[Array, Array]:
+    """What X is compared with (L, p, s), and how fast the difference changes where X does as slopes (L, ..., p, s)."""
+    if not goal.free_phase:
+        return goal.value, slopes
+    # |X - e^(i phi) U| is least at the phase of <U, X>; as X moves that phase turns too, at `rate`, and so does what X is compared with
+    overlap = np.sum(np.conj(goal.value) * here, axis=(1, 2))
+    value = (overlap / np.abs(overlap))[:, None, None] * goal.value
+    between = tuple(range(1, slopes.ndim - 2))
+    rate = np.imag(
+        np.sum(np.expand_dims(np.conj(goal.value), between) * slopes, axis=(-2, -1)) / np.expand_dims(overlap, between)
+    )
+    return value, slopes - 1j * rate[..., None, None] * np.expand_dims(value, between)
 
 
 def flat(matrices: Array) -> Array:

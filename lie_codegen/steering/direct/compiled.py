@@ -17,7 +17,7 @@ from lie_codegen.steering.direct.numpy_search import NumpySearch
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
 
 _CORE = "direct_core.c"
-_HEADERS = ("direct_lanes.h", "direct_chain.h", "direct_steps.h")
+_HEADERS = ("direct_lanes.h", "direct_algebra.h", "direct_chain.h", "direct_steps.h", "direct_newton.h")
 _SIZES = "direct_sizes.h"
 _ALIGNED = 64
 
@@ -44,11 +44,7 @@ def machine(group: MatrixGroup, controls: int) -> Machine:
         return {**texts, _SIZES: sizes}
 
     library = build_source(files, _CORE, namespace="direct_core", definition=sizes)
-    return (
-        NumpySearch()
-        if library is None
-        else CompiledSearch(load_library(library), group, controls)
-    )
+    return NumpySearch() if library is None else CompiledSearch(load_library(library), group, controls)
 
 
 class _Sparse(ctypes.Structure):
