@@ -113,7 +113,7 @@ def phase_ahead(programme: Programme, goal: Goal, u: Array) -> Array:
     if not goal.free_phase:
         return np.zeros(len(u))
     here = goal.left @ end(programme, u) @ goal.right
-    return np.angle(np.sum(np.conj(goal.value) * here, axis=(1, 2)))
+    return np.asarray(np.angle(np.sum(np.conj(goal.value) * here, axis=(1, 2))))
 
 
 def end(programme: Programme, u: Array) -> Array:
