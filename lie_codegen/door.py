@@ -22,6 +22,8 @@ from typing import Any, TypeAlias, TypeVar
 import lazy_loader
 
 from lie_codegen.errors import ArgumentError, LieCodegenError, SubinterpreterError, SystemRefusalError
+from lie_codegen.lost_parts import has_masks, loses_parts, refuse_lost_parts
+from lie_codegen.unbound import unbound
 
 #: Packages whose frames belong to the work of a call: whatever else raises is the user's own.
 _INSIDE = {
@@ -78,7 +80,7 @@ def is_subinterpreter() -> bool:
 def _guarded(value: Any, name: str) -> Any:
     """The same value; a function is put behind the guard where it is defined too, of a class the constructor is."""
     if isinstance(value, types.FunctionType) and not hasattr(value, "__guarded__"):
-        guarded = _without_masks(_guard(value, name), name)
+        guarded = _guard(value, name)
         home = sys.modules[value.__module__].__dict__
         if home.get(name) is value:
             home[name] = guarded
@@ -86,27 +88,9 @@ def _guarded(value: Any, name: str) -> Any:
     if isinstance(value, type) and not issubclass(value, enum.Enum) and "__init__" in vars(value):
         constructor = vars(value)["__init__"]
         if isinstance(constructor, types.FunctionType) and not hasattr(constructor, "__guarded__"):
-            guarded = _without_masks(_guard(constructor, name, bound=True), name)
+            guarded = _guard(constructor, name, bound=True)
             type.__setattr__(value, "__init__", guarded)
     return value
-
-
-def has_masks(value: Any) -> bool:
-    """Whether it is an array of numpy.ma with masked entries: numpy drops the mask where numbers are asked for, and what lay below counts."""
-    return type(value).__name__ in ("MaskedArray", "MaskedConstant") and bool(value.mask.any())
-
-
-def _without_masks(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    @functools.wraps(function)
-    def checked(*args: Any, **named: Any) -> Any:
-        for value in (*args, *named.values()):
-            if has_masks(value):
-                raise ArgumentError(
-                    f"{name}: an array has masked entries, which are no numbers; fill them (.filled(...))"
-                )
-        return function(*args, **named)
-
-    return checked
 
 
 def guard_methods(kind: Class) -> Class:
@@ -131,15 +115,23 @@ def _guard(
     @functools.wraps(function)
     def guarded(*args: Any, **named: Any) -> Any:
         try:
+            refuse_lost_parts()
+            if has_masks(args) or (named and has_masks(named.values())):
+                raise ArgumentError(
+                    f"{name}: an array has masked entries, which are no numbers; fill them (.filled(...))"
+                )
             return function(*args, **named)
         except LieCodegenError:
             raise
         except Exception as error:
-            # No frame below this one: the arguments could not even be bound, which Python says best.
-            if error.__traceback__ is None or error.__traceback__.tb_next is None or not _is_inside(error):
+            if (from_outside and _root(sys._getframe(1)) == "lie_codegen") or not _is_inside(error):
                 raise
-            if from_outside and _root(sys._getframe(1)) == "lie_codegen":
-                raise
+            if isinstance(error, TypeError) and (refusal := unbound(function, name, args, named)) is not None:
+                raise ArgumentError(refusal) from None
+            if loses_parts(error):
+                raise ArgumentError(
+                    f"{name}: complex numbers where real ones are asked for; give their real part (.real) if that is meant"
+                ) from error
             kind = SystemRefusalError if isinstance(error, OSError | MemoryError) else ArgumentError
             shown = args[1:] if bound else args
             raise kind(f"{name}: {_given(shown, named)}: {type(error).__name__}: {_text(error)}") from error

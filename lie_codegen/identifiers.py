@@ -31,7 +31,7 @@ def unknown_keywords(where: str, unknown: Iterable[str], known: Iterable[str]) -
     said = []
     for word in unknown:
         near = get_close_matches(word, names, n=2, cutoff=0.6)
-        said.append(f"no option {word}" + (f"; did you mean {' or '.join(near)}?" if near else ""))
+        said.append(f"no option {word}" + (f"; did you mean {' or '.join(near)}?" if near else "."))
     return f"{where}: {', '.join(said)} It has {', '.join(names)}" if said else ""
 
 

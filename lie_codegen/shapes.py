@@ -17,12 +17,16 @@ def shaped(value: ArrayLike, shape: tuple[int | str | EllipsisType, ...], where:
     """The value as doubles of a shape: (3,), (..., 3) with any axes before, ("k", 3) with an axis of any length.
 
     Raises:
-        ShapeError: naming `where`: no numbers, or another shape, with the one that is taken.
+        ShapeError: naming `where`: no numbers, complex ones, or another shape, with the one that is taken.
     """
     try:
-        array = np.asarray(value, dtype=float)
+        array = np.asarray(value)
+        is_complex = array.dtype.kind == "c"
+        array = array if is_complex else array.astype(float, copy=False)
     except (TypeError, ValueError):
         raise ShapeError(f"{where} must be numbers of shape {_written(shape)}, given {value!r:.60}") from None
+    if is_complex:
+        raise ShapeError(f"{where} is real, of shape {_written(shape)}; complex numbers were given")
     open_ended = shape[:1] == (...,)
     last = shape[1:] if open_ended else shape
     own = array.shape[max(0, array.ndim - len(last)) :] if open_ended else array.shape

@@ -7,7 +7,6 @@ single calls, which are equal to the interpreter, do not use it.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 
 from lie_codegen.codegen.tape import Statement, Tape
 
@@ -41,6 +40,6 @@ def with_shared_reciprocals(tape: Tape) -> Tape:
         elif statement.op == "DIV" and statement.operands[1] in shared:
             moved[index] = add("MUL", operands[0], reciprocal(statement.operands[1]))
         else:
-            done.append(replace(statement, operands=operands))
+            done.append(statement._replace(operands=operands))
             moved[index] = len(done) - 1
     return Tape(tuple(done), tuple(tuple(moved[index] for index in port) for port in tape.outputs))

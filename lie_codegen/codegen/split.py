@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from lie_codegen.codegen.tape import Statement, Tape
 
@@ -82,5 +82,5 @@ def _piece(tape: Tape, own: Iterable[int], place: dict[int, int], work: int, out
     for index in own:
         fresh[index] = len(statements)
         old = tape.statements[index]
-        statements.append(replace(old, operands=tuple(fresh[operand] for operand in old.operands)))
+        statements.append(old._replace(operands=tuple(fresh[operand] for operand in old.operands)))
     return Tape(tuple(statements), tuple(tuple(fresh[index] for index in port) for port in outputs))

@@ -7,18 +7,17 @@ every value has one name, so that the same program can be printed for scalars or
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from lie_codegen.errors import CodegenError
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.routine import Routine
 
 
-@dataclass(frozen=True)
-class Statement:
-    """One value. `operands` are indices of earlier statements.
+class Statement(NamedTuple):
+    """One value. `operands` are indices of earlier statements. A tuple, for a kernel has thousands, which are made, hashed and compared.
 
     `op` is CALL (of `routine`, operands its condition and its inputs), RESULT (entry `slot[0]` of a CALL, which it follows), INPUT (entry `slot[1]` of port `slot[0]`), CONST (`value`), SELECT (operand 1 where operand
     0 is not zero, else operand 2), or CasADi's name without its OP_.
@@ -84,18 +83,18 @@ def _single_assignment(function: Any) -> tuple[list[Statement], list[list[int]]]
 
     def add(statement: Statement) -> int:
         # repr in the key of a constant, because 0.0 == -0.0 and NaN differs from itself
-        key = (statement, repr(statement.value))
-        if key not in known:
-            known[key] = len(statements)
+        key = (statement, repr(statement.value) if statement.op == "CONST" else "")
+        place = known.setdefault(key, len(statements))
+        if place == len(statements):
             statements.append(statement)
-        return known[key]
+        return place
 
     zero = Statement("CONST", value=0.0)
     outputs = [[-1] * function.numel_out(i) for i in range(function.n_out())]
     work: dict[int, int] = {}
+    identity, inputs_of, outputs_of = function.instruction_id, function.instruction_input, function.instruction_output
     for k in range(function.n_instructions()):
-        op = names[function.instruction_id(k)]
-        read, written = function.instruction_input(k), function.instruction_output(k)
+        op, read, written = names[identity(k)], inputs_of(k), outputs_of(k)
         if op == "OUTPUT":
             outputs[written[0]][written[1]] = work[read[0]]
         elif op == "INPUT":
@@ -168,5 +167,5 @@ def _schedule(statements: list[Statement], outputs: Iterable[Iterable[int]]) -> 
                 continue
             old = statements[each]
             place[each] = len(ordered)
-            ordered.append(replace(old, operands=tuple(place[i] for i in old.operands)))
+            ordered.append(old._replace(operands=tuple(place[i] for i in old.operands)))
     return Tape(tuple(ordered), tuple(tuple(place[i] for i in port) for port in outputs))

@@ -21,6 +21,10 @@ def real_number(value: Any, what: str) -> sp.Expr:
     Raises:
         InputError, NotFiniteError: not a finite real number; names `what`.
     """
+    if isinstance(value, complex | np.complexfloating):
+        if value.imag != 0:
+            raise InputError(f"{what} is {value}; it must be real")
+        value = value.real
     if isinstance(value, float | np.floating):
         if not np.isfinite(value):
             raise NotFiniteError(f"{what} is {value}; it must be finite")

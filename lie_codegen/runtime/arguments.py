@@ -11,9 +11,9 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature
-from lie_codegen.door import has_masks
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.kernel import Port
+from lie_codegen.lost_parts import has_masks
 from lie_codegen.runtime.outputs import empty
 
 #: The name of a real type -> (of real entries, of complex ones).
@@ -70,7 +70,7 @@ def as_array(kernel: str, port: Port, value: Any, real: str = "double") -> Array
         array = np.asarray(value)
     except ValueError as error:
         raise ShapeError(f"{kernel}: {port.name} is ragged: expected {describe(port)}") from error
-    if has_masks(value):
+    if has_masks((value,)):
         raise InputError(f"{kernel}: {port.name} has masked entries, which are no numbers; fill them (.filled(...))")
     if array.dtype.kind == "c" and not port.is_complex:
         raise ShapeError(f"{kernel}: {port.name} is real, {describe(port)}; complex numbers were given")

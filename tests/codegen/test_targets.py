@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import json
+import random
 import re
 import shutil
 import subprocess
@@ -14,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import lie_codegen as lc
 
@@ -63,6 +66,52 @@ def test_a_module_runs_its_vectors(law: lc.Kernel, tmp_path: Path) -> None:
         folder = lc.generate(what, tmp_path / name, target="wasm")
         assert "vectors, largest error" in run(["node", "example.mjs"], folder)
         assert "export function" in next(folder.glob("*.d.ts")).read_text()
+
+
+#: Reads [function, inputs ...] in lines, calls the module of a package, and prints what comes out.
+ASKED = """
+import { readFileSync } from "node:fs";
+const kernels = await import(process.argv[1]);
+for (const line of readFileSync(0, "utf8").trim().split("\\n")) {
+  const [name, ...given] = JSON.parse(line);
+  console.log(JSON.stringify(Object.values(kernels[name](...given)).map(each => Array.from(each, String))));
+}
+"""
+
+
+def asked(folder: Path, calls: list[tuple[str, list[np.ndarray]]]) -> list[list[np.ndarray]]:
+    """The outputs of each call of a package's module, by node."""
+    module = next(path for path in folder.glob("*.mjs") if path.name != "example.mjs")
+    given = "\n".join(json.dumps([name, *(np.ravel(each).tolist() for each in inputs)]) for name, inputs in calls)
+    command = ["node", "--input-type=module", "-e", ASKED, module.as_uri()]
+    done = subprocess.run(command, input=given, capture_output=True, text=True, timeout=500, check=False)
+    assert done.returncode == 0, done.stderr
+    return [[np.array(each, float) for each in json.loads(line)] for line in done.stdout.splitlines()]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None or shutil.which("node") is None, reason="no ziglang or node"
+)
+def test_a_module_gives_scipys_exponential_and_the_numbers_of_python(law: lc.Kernel, tmp_path: Path) -> None:
+    """Another compiler's mathematics (musl's sine) for another machine: equal to rounding, and no number where there is none."""
+    rng = np.random.default_rng(5)
+    se2, folder = lc.group("se2"), lc.generate("se2", tmp_path / "se2", target="wasm")
+    x = rng.uniform(-2, 2, (40, 3))
+    x[0] *= 1e-9  # where the closed form divides by an angle that is nearly none
+    *X, nothing = [
+        found[0].reshape(3, 3) for found in asked(folder, [("exp", [each]) for each in (*x, np.full(3, 1e308))])
+    ]
+    np.testing.assert_allclose(X, [expm(se2.hat(each)) for each in x], rtol=0, atol=4e-15)
+    back = [found[0] for found in asked(folder, [("log", [each]) for each in X])]
+    np.testing.assert_allclose(back, x, rtol=0, atol=1e-14)
+    assert not np.isfinite(nothing).all()
+
+    built, folder = lc.build(law).attitude_pd, lc.generate(law, tmp_path / "law", target="wasm")
+    inputs = [law.sample(random.Random(seed)) for seed in range(25)]
+    for found, given in zip(asked(folder, [(built.name, list(each)) for each in inputs]), inputs, strict=True):
+        for ours, theirs in zip(found, built(*given), strict=True):
+            np.testing.assert_allclose(ours, np.ravel(theirs), rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 import time
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import LieCodegenError
@@ -122,22 +124,87 @@ def test_the_arguments_from_which_the_hunt_departs_are_answered(name: str) -> No
 
 
 MASKED = np.ma.masked_array([0.1, 0.2, 0.3], [True, False, False])
+COMPLEX = np.array([0.1 + 1.0j, 0.2, 0.3])
 
 
-def test_masked_entries_are_no_numbers() -> None:
+def _takers() -> dict[str, Callable[[Any], Any]]:
+    """What asks for real numbers: three, or so many rows of three, or times."""
+    library, plan, held = lc.build("so3"), plausible._plan(), lc.SampledInput([0.0, 1.0, 2.0], np.ones((2, 3)))
+    still = lc.reference("so3", ["0", "0", "0"])
+    return {
+        "steer": lambda x: lc.steer("so3", x, ("w1", "w2"), 2.0),
+        "simulate": lambda x: lc.simulate("so3", ["cos(t)", "0", "0"], t=x),
+        "SampledInput": lambda x: lc.SampledInput([0.0, 1.0, 2.0], [x, x]),
+        "tracking_law": lambda x: lc.tracking_law(
+            "so3", inertia=[1, 2, 2], error="so3_right", gains={"K_p": x, "K_d": 1}
+        ),
+        "exp": library.exp,
+        "exp.batch": lambda x: library.exp.batch([x, x]),
+        "Plan.u": plan.u,
+        "Plan.X": plan.X,
+        "an input": held,
+        "closed_loop": lambda x: lc.closed_loop("so3", law=plausible._law(), reference=still, xi0=x, t=[0.0, 0.1]),
+        "hat": lc.group("so3").hat,
+    }
+
+
+@pytest.mark.parametrize("form", ["itself", "in a list", "in a list of lists", "in an array of objects"])
+def test_masked_entries_are_no_numbers(form: str) -> None:
     """numpy drops the mask without a word: what lay below would be steered to."""
-    library = lc.build("so3")
-    for call in (
-        lambda: lc.steer("so3", MASKED, ("w1", "w2"), 2.0),
-        lambda: lc.simulate("so3", ["cos(t)", "0", "0"], t=MASKED),
-        lambda: lc.SampledInput([0.0, 1.0, 2.0], MASKED),
-        lambda: library.exp(MASKED),
-        lambda: library.exp.batch(np.ma.masked_array(np.ones((2, 3)), np.eye(2, 3))),
-    ):
-        with pytest.raises(lc.errors.InputError, match="masked entries"):
-            call()
+    given: Any = {
+        "itself": MASKED,
+        "in a list": [MASKED[0], 0.2, 0.3],
+        "in a list of lists": [[MASKED], (MASKED,)],
+        "in an array of objects": np.array([MASKED[0], None, MASKED], dtype=object),
+    }[form]
+    for taker in _takers().values():
+        with pytest.raises(lc.errors.InputError, match=r"masked entries|takes numbers"):
+            taker(given)
     whole = np.ma.masked_array([0.1, 0.2, 0.3], False)
-    np.testing.assert_array_equal(library.exp(whole), library.exp([0.1, 0.2, 0.3]))
+    np.testing.assert_array_equal(lc.build("so3").exp(whole), lc.build("so3").exp([0.1, 0.2, 0.3]))
+
+
+def test_masks_are_found_in_what_holds_itself() -> None:
+    endless: list[Any] = [1.0]
+    endless.append({"a": endless})
+    with pytest.raises(lc.errors.InputError):
+        hostile.alarmed(2.0, lambda: lc.SampledInput([0.0, 1.0], endless))
+    endless[1]["b"] = (MASKED,)
+    with pytest.raises(lc.errors.InputError, match="masked entries"):
+        hostile.alarmed(2.0, lambda: lc.SampledInput([0.0, 1.0], endless))
+
+
+@pytest.mark.parametrize("told", ["default", "ignore"])
+@pytest.mark.parametrize("form", ["an array", "a list of numpy's numbers"])
+def test_complex_numbers_are_not_taken_for_their_real_part(form: str, told: Any) -> None:
+    """numpy warns and drops the imaginary part, and says nothing where warnings are ignored."""
+    given = COMPLEX if form == "an array" else list(COMPLEX)
+    with warnings.catch_warnings():
+        warnings.simplefilter(told)
+        for taker in _takers().values():
+            with pytest.raises(lc.errors.InputError, match=r"complex|must be real"):
+                taker(given)
+        with pytest.raises(lc.errors.InputError, match="complex numbers where real ones"):
+            lc.simulate("so3", lambda t: COMPLEX, t=[0.0, 1.0])
+        with pytest.raises(lc.errors.InputError, match="complex numbers where real ones"):
+            lc.steer("so3", [0.1, 0.2, 0.3], ("w1", "w2"), np.complex128(2 + 1j))
+    # Where complex numbers are right they are taken, and the lines of others warn as they did.
+    assert lc.steer("su2", expm(0.1j * np.array([[0, 1], [1, 0]])), ("sx", "sy"), 2.0).cost >= 0
+    with pytest.warns(np.exceptions.ComplexWarning):
+        np.asarray(COMPLEX, dtype=float)
+
+
+def test_what_is_missing_is_named_with_what_it_may_be() -> None:
+    with pytest.raises(lc.errors.InputError, match=r"tracking_law: error= missing .*so3_right"):
+        lc.tracking_law("so3", inertia=[1, 2, 3], gains={"K_p": [1, 1, 1], "K_d": 1})
+    with pytest.raises(lc.errors.InputError, match=r"tracking_law: no option errr; did you mean error\?"):
+        lc.tracking_law("so3", inertia=[1, 2, 3], errr="so3_right")
+    with pytest.raises(lc.errors.InputError, match=r"steer: target=, controls=, duration= missing .*seconds"):
+        lc.steer("so3")
+    with pytest.raises(lc.errors.InputError, match="rkmk4_step: too many positional"):
+        lc.rkmk4_step("so3", "so3", "so3", "so3", "so3", "so3", "so3")
+    with pytest.raises(lc.errors.InputError, match=r"Plan\.X: t= missing"):
+        plausible._plan().X()
 
 
 def test_costs_and_conditions_without_end_are_refused_at_once() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib.util
 import json
 import os
 import random
@@ -45,6 +46,12 @@ OURS, OTHER = 3, 4
 def plan(angle: float) -> Any:
     """A plan that needs no compiler."""
     return lc.steer("so3", (angle, 0.05, 0.08), ("w1", "w2"), 24.0, method="four_phase")
+
+
+@cache
+def optimal(angle: float) -> Any:
+    """One that a page solves again."""
+    return lc.steer("so3", (angle, 0.05, 0.08), ("w1", "w2"), 2.0)
 
 
 @cache
@@ -98,6 +105,9 @@ FOLDERS: dict[str, Write] = {
     "unit": lambda path, new: lc.generate("so2", path, target="fmu", name="changed" if new else None),
     "crate": lambda path, new: lc.generate("so2", path, target="rust", real=_real(new)),
 }
+if importlib.util.find_spec("ziglang") is not None:  # compiled anew at each write
+    FILES["solved.html"] = lambda path, new: lc.view(optimal(0.2 if new else 0.1), path, solve=True)
+    FOLDERS["module"] = lambda path, new: lc.generate("so2", path, target="wasm", name="changed" if new else None)
 SUBJECTS = {**FILES, **FOLDERS}
 
 

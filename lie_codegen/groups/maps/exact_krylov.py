@@ -83,10 +83,10 @@ def _factored(polynomial: Polynomial) -> Entry | None:
     terms = {
         tuple(key.count(i) for i in places): sp.Rational(v.numerator, v.denominator) for key, v in polynomial.items()
     }
-    scale, factors = sp.Poly(terms, *symbols.values()).factor_list()
+    scale, irreducible = _irreducible(sp.Poly(terms, *symbols.values()))
     total = Fraction(int(scale.p), int(scale.q))
     found: list[Factor] = []
-    for factor, multiplicity in factors:
+    for factor, multiplicity in irreducible:
         if factor.total_degree() > 2:
             return None
         items: list[tuple[tuple[int, ...], Fraction]] = []
@@ -98,6 +98,25 @@ def _factored(polynomial: Polynomial) -> Entry | None:
         total *= lead**multiplicity
         found += [tuple((key, value / lead) for key, value in items)] * multiplicity
     return total, _paired(sorted(found))
+
+
+def _irreducible(polynomial: sp.Poly) -> tuple[sp.Rational, list[tuple[sp.Poly, int]]]:
+    """A number, and irreducible factors with their multiplicities.
+
+    Where a coordinate x appears in first degree alone, p = a x + b = gcd(a, b) (a' x + b') and the last is irreducible: one of two factors of it
+    would be free of x, and divide a' and b'. Translations do, so that general factoring is left with polynomials of a few coordinates; for many
+    of them it draws points at random, and now and then takes minutes.
+    """
+    if polynomial.is_ground:
+        return polynomial.LC(), []
+    for x in polynomial.gens:
+        if polynomial.degree(x) == 1:
+            a = polynomial.diff(x)
+            common = a.gcd(polynomial - a * sp.Poly(x, *polynomial.gens))
+            scale, factors = _irreducible(common)
+            return scale, [*factors, (polynomial.exquo(common), 1)]
+    found: tuple[sp.Rational, list[tuple[sp.Poly, int]]] = polynomial.factor_list()
+    return found
 
 
 def _paired(

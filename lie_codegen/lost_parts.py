@@ -1,0 +1,65 @@
+"""What NumPy leaves out of an array without an error: masked entries lose their mask, complex numbers their imaginary part."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterable
+from typing import Any
+
+#: What holds neither: most arguments are of these classes, and are passed over.
+_WITHOUT_MASKS = frozenset({bool, int, float, complex, str, bytes, type(None)})
+
+
+def has_masks(values: Iterable[Any]) -> bool:
+    """Whether one of the values is an array of numpy.ma with masked entries, or a list, a tuple, a mapping or an array of objects (at any
+    depth) that holds one.
+
+    numpy drops the mask where numbers are asked for, and what lay below it counts.
+    """
+    if "numpy.ma" in sys.modules:  # else nobody can have made one
+        for value in values:
+            if type(value) not in _WITHOUT_MASKS:
+                return _holds_masks(list(values))
+    return False
+
+
+def _holds_masks(left: list[Any]) -> bool:
+    masked, seen = sys.modules["numpy.ma"], set[int]()
+    while left:
+        value = left.pop()
+        if isinstance(value, masked.MaskedArray):
+            if value.mask.any():
+                return True
+        elif _holds_others(value) and id(value) not in seen:  # a list may hold itself
+            seen.add(id(value))
+            inner = value.values() if isinstance(value, dict) else getattr(value, "flat", value)
+            left.extend(each for each in inner if type(each) not in _WITHOUT_MASKS)
+    return False
+
+
+def _holds_others(value: Any) -> bool:
+    return isinstance(value, list | tuple | dict) or getattr(getattr(value, "dtype", None), "kind", "") == "O"
+
+
+_entry: list[Any] = [None]
+
+
+def refuse_lost_parts() -> None:
+    """From here on NumPy's warning that an imaginary part is discarded is an error where a line of ours loses it.
+
+    Reals are asked for in hundreds of places, and a list, an array or a function of the user may bring complex numbers into each; NumPy
+    sees all of these. The user's own lines warn as before: the entry among the filters of warnings is for our modules. It is put in front
+    again where others came before it, for to ignore warnings is not to agree to other numbers.
+    """
+    if not warnings.filters or warnings.filters[0] is not _entry[0]:
+        import numpy as np
+
+        # filterwarnings puts an equal entry from behind to the front, so that there is never more than one
+        warnings.filterwarnings("error", category=np.exceptions.ComplexWarning, module=r"lie_codegen\b")
+        _entry[0] = warnings.filters[0]
+
+
+def loses_parts(error: BaseException) -> bool:
+    """Whether it is that warning, as an error."""
+    return type(error).__name__ == "ComplexWarning"
