@@ -21,7 +21,7 @@ from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNu
 from lie_codegen.control.certificate_record import Certificate, loop_state
 from lie_codegen.control.claims import check_constant, is_claimed
 from lie_codegen.control.compatibility import check_compatibility
-from lie_codegen.control.critical_points import found_points
+from lie_codegen.control.critical_points import CriticalPoints, found_points
 from lie_codegen.control.error_catalogue import as_error, gain
 from lie_codegen.control.error_function import ErrorFunction
 from lie_codegen.control.error_samples import error_samples
@@ -80,48 +80,21 @@ def certificate(
             certificate covers.
     """
     group = as_group(group, "certificate")
-    for name, value in (("limits", limits), ("sample", sample), ("delay", delay)):
-        if value is not None and value is not False:
-            raise InputError(
-                f"certificate: {name} = {value!r}: a force that is clipped, held or delayed voids the proof, and no certificate covers such a "
-                "loop; lc.loop_margins gives its margins, gains whose force stays below the limits need no clipping, and damping_limits= of "
-                "lc.tracking_law shortens the damping alone, which a certificate covers"
-            )
+    _refuse_other_loops(limits=limits, sample=sample, delay=delay)
     if law is not None:
-        told = {
-            "inertia": inertia,
-            "error": error,
-            "gains": gains,
-            "feedforward": None if feedforward == "levi_civita" else feedforward,
-            "damping_limits": damping_limits,
-        }
-        twice = [name for name, value in told.items() if value is not None]
-        if twice:
-            raise InputError(
-                f"certificate: {twice[0]} beside law: the law has its own, and with another the loop is not the one that is certified; "
-                "give the law alone, or everything but the law"
-            )
-        inertia, error, gains, feedforward, damping_limits = _of_law(law, group)
+        told = {"inertia": inertia, "error": error, "gains": gains, "damping_limits": damping_limits}
+        told["feedforward"] = None if feedforward == "levi_civita" else feedforward
+        inertia, error, gains, feedforward, damping_limits = _of_law_alone(law, group, told)
     if inertia is None or error is None or gains is None:
         raise InputError("certificate needs inertia, error and gains, or a law made by lc.tracking_law")
-    if feedforward not in FEEDFORWARDS:
-        raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
-    if not (np.isfinite(speed) and speed >= 0):
-        raise InputError(f"certificate: speed = {speed} must be a bound, 0 or more")
-    if overshoot is not None and not overshoot > 1:
-        raise InputError(f"certificate: overshoot = {overshoot} must be above 1: at t = 0 W itself is W(0)")
+    _check_options(feedforward, speed, overshoot)
     pair, n = as_error(group, error, gains), group.dim
     body = as_floats(positive_matrix(inertia, n, "inertia"))
     K_d = as_floats(positive_matrix(gain(gains, "K_d", "a tracking law"), n, "K_d"))
     stiffness = np.array(check_compatibility(pair).hessian)
     stiffness = (stiffness + stiffness.T) / 2
     points = check_constant(pair) if is_claimed(pair) else found_points(pair)
-    if points.L is None or points.L_component is None:
-        raise InputError(
-            f"certificate: phi of {pair.name} on {group.name} stays bounded on the way to infinity: no level of W keeps the state near the "
-            "reference"
-        )
-    L = points.L if pair.constant is None else min(points.L, pair.constant)
+    L, L_component = _least_levels(points, pair)
     metric, samples = Metric(group, body), error_samples(pair)
     if state is not None:
         if len(state) != 4:
@@ -148,21 +121,82 @@ def certificate(
         best = pointwise.best(overshoot)
     else:
         best = Rate(float(epsilon), pointwise.at(float(epsilon), starts=6), overshoot_of(float(epsilon), b_2))
-    stated = theorem.best(overshoot) if feedforward == "levi_civita" else Rate(float("nan"), float("nan"), float("nan"))
     proved = proved_constants(pair, gains, metric, level, (b_1, b_2, h, t)) if prove else UNPROVED
-    sure = float("nan")
-    if feedforward == "levi_civita" and np.all(np.isfinite(proved)):
-        sure = replace(theorem, b_1=proved[0], b_2=proved[1], h=proved[2], t=proved[3]).best(overshoot).rate
-    # Near rest the loop is theta'' = -I^-1 (H theta + K_d theta'): no rate of W, which is quadratic, can be above twice that of its slowest mode.
-    slowest = np.linalg.eigvals(
-        np.block([[np.zeros((n, n)), np.eye(n)], [-metric.inverse @ stiffness, -metric.inverse @ K_d]])
-    )
+    stated, sure = _rates_of_theorem(theorem, feedforward, proved, overshoot)
     return Certificate(
-        pair, body, K_d, feedforward, float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component), level,
+        pair, body, K_d, feedforward, L, L_component, level,
         float(speed), bound, b_1, b_2, proved[0], proved[1], h, proved[2], t, proved[3], best.epsilon, best.rate, best.k, stated.epsilon,
         stated.rate, sure, stated.k, theorem.P(stated.epsilon), theorem.P(stated.epsilon, -1.0), theorem.Q(stated.epsilon),
-        share, _largest_slopes(search), float(-2 * np.max(slowest.real)), points, status_of(pair, points, proved, len(search.places.X)),
+        share, _largest_slopes(search), _rate_near_rest(metric, stiffness, K_d), points,
+        status_of(pair, points, proved, len(search.places.X)),
     )  # fmt: skip
+
+
+def _refuse_other_loops(**given: Any) -> None:
+    """Refuse options of a loop whose force is not the law's own all the time."""
+    for name, value in given.items():
+        if value is not None and value is not False:
+            raise InputError(
+                f"certificate: {name} = {value!r}: a force that is clipped, held or delayed voids the proof, and no certificate covers such a "
+                "loop; lc.loop_margins gives its margins, gains whose force stays below the limits need no clipping, and damping_limits= of "
+                "lc.tracking_law shortens the damping alone, which a certificate covers"
+            )
+
+
+def _of_law_alone(law: Kernel, group: MatrixGroup, told: Mapping[str, Any]) -> tuple[Any, Any, Any, str, Any]:
+    """As `_of_law`, where nothing that the law has is told beside it."""
+    twice = [name for name, value in told.items() if value is not None]
+    if twice:
+        raise InputError(
+            f"certificate: {twice[0]} beside law: the law has its own, and with another the loop is not the one that is certified; "
+            "give the law alone, or everything but the law"
+        )
+    return _of_law(law, group)
+
+
+def _check_options(feedforward: str, speed: float, overshoot: float | None) -> None:
+    if feedforward not in FEEDFORWARDS:
+        raise InputError(f"feedforward {feedforward!r} is not known; choose one of {', '.join(FEEDFORWARDS)}")
+    if not (np.isfinite(speed) and speed >= 0):
+        raise InputError(f"certificate: speed = {speed} must be a bound, 0 or more")
+    if overshoot is not None and not overshoot > 1:
+        raise InputError(f"certificate: overshoot = {overshoot} must be above 1: at t = 0 W itself is W(0)")
+
+
+def _least_levels(points: CriticalPoints, pair: ErrorFunction) -> tuple[float, float]:
+    """(L, L of the reference's component): below L no other critical point lies, and no error function with a log ends.
+
+    A claimed `constant` of the pair may be below what was found: then it is the bound, for so far the claim goes.
+    """
+    if points.L is None or points.L_component is None:
+        raise InputError(
+            f"certificate: phi of {pair.name} on {pair.group.name} stays bounded on the way to infinity: no level of W keeps the state near the "
+            "reference"
+        )
+    L = points.L if pair.constant is None else min(points.L, pair.constant)
+    return float(L), float(min(points.L_component, L) if pair.uses_log else points.L_component)
+
+
+def _rates_of_theorem(
+    theorem: TheoremNumbers, feedforward: str, proved: tuple[float, ...], overshoot: float | None
+) -> tuple[Rate, float]:
+    """(the theorem's rate with the numbers found, its rate with proved ones); NaN for other feedforwards, of which it says nothing."""
+    if feedforward != "levi_civita":
+        return Rate(float("nan"), float("nan"), float("nan")), float("nan")
+    stated = theorem.best(overshoot)
+    if not np.all(np.isfinite(proved)):
+        return stated, float("nan")
+    sure = replace(theorem, b_1=proved[0], b_2=proved[1], h=proved[2], t=proved[3])
+    return stated, sure.best(overshoot).rate
+
+
+def _rate_near_rest(metric: Metric, stiffness: Array, K_d: Array) -> float:
+    """What no rate can exceed: near rest the loop is theta'' = -I^-1 (H theta + K_d theta'), and W, quadratic there, falls at twice the decay
+    of its slowest mode.
+    """
+    n = len(K_d)
+    modes = np.block([[np.zeros((n, n)), np.eye(n)], [-metric.inverse @ stiffness, -metric.inverse @ K_d]])
+    return float(-2 * np.max(np.linalg.eigvals(modes).real))
 
 
 def _least_share(limits: Any, K_d: Array, metric: Metric, level: float) -> float:

@@ -51,7 +51,7 @@ from lie_codegen.kernel.linear import (
     scaled,
     transpose,
 )
-from lie_codegen.kernel.parameter import input_ports, parameter, refuse_input, sample_inputs, values_of
+from lie_codegen.kernel.parameter import Parameter, input_ports, parameter, refuse_input, sample_inputs, values_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,41 +155,18 @@ def hybrid_law(
             f"hybrid_law: {what}",
             "the gap, below which the jump must stay, is computed from it when the law is made",
         )
-    K = attitude_gain(K_p, 3, "K_p")
-    parameters = (
-        parameter(Port("inertia", (3, 3), description="of the body, symmetric"), inertia, body_inertia),
-        parameter(
-            Port("K_d", (3, 3), description="dissipation, symmetric"),
-            K_d,
-            lambda value, what: positive_matrix(value, 3, what),
-        ),
-    )
+    K, parameters = attitude_gain(K_p, 3, "K_p"), _parameters(inertia, K_d)
     gain = as_floats(K)
     u, warp, most, gaps = warp_of(gain, kappa, direction)
-    delta = min(gaps) / 2 if hysteresis is None else float(hysteresis)
-    if not 0 < delta < min(gaps):
-        raise InputError(
-            f"hybrid_law: hysteresis = {delta:g} must lie between 0 and the gap {min(gaps):.6g}: above it the law can stay"
-        )
+    delta = _hysteresis(hysteresis, min(gaps))
     derivation = derivation_of(group)
 
     def body(
         ops: Arithmetic, X: Matrix, xi: Vector, X_d: Matrix, xi_d: Vector, xi_d_dot: Vector, q: Scalar, *given: Any
     ) -> tuple[Any, ...]:
         metric, D = values_of(ops, parameters, given)
-        E = matmul(transpose(X_d), X)
-        weights, axis = constant_matrix(ops, K), [ops.constant(x) for x in u]
-        phi, slope = _trace(weights, E, gap_matrix(X, X_d))
-        sign = ops.where(ops.less(q, 0), ops.constant(-1), ops.constant(1))
-        here = _warped(ops, derivation, weights, E, phi, axis, warp, sign)
-        there = _warped(ops, derivation, weights, E, phi, axis, warp, -sign)
-        stays = ops.less(here[0] - there[0], ops.constant(delta))
-        chosen = ops.where(stays, sign, -sign)
-        turn = [
-            [ops.where(stays, a, b) for a, b in zip(r, s, strict=True)] for r, s in zip(here[2], there[2], strict=True)
-        ]
-        at = [ops.where(stays, a, b) for a, b in zip(here[1], there[1], strict=True)]
-        pull = plus(matvec(turn, at), scaled(chosen * ops.constant(warp) * dot(at, axis), slope))
+        E, axis = matmul(transpose(X_d), X), [ops.constant(x) for x in u]
+        pull, chosen = _pull(ops, derivation, constant_matrix(ops, K), E, gap_matrix(X, X_d), axis, warp, delta, q)
         nu = matvec(transpose(E), xi_d)
         turned = matvec(transpose(E), xi_d_dot)
         nu_dot = minus(turned, bracket(ops, group.algebra, xi, nu))
@@ -233,6 +210,54 @@ def hybrid_law(
         gain=tuple(tuple(float(x) for x in row) for row in gain),
     )
     return nan_off_group(made, group, ("X", "X_d"))  # type: ignore[return-value]
+
+
+def _parameters(inertia: Any, K_d: Any) -> tuple[Parameter, ...]:
+    return (
+        parameter(Port("inertia", (3, 3), description="of the body, symmetric"), inertia, body_inertia),
+        parameter(
+            Port("K_d", (3, 3), description="dissipation, symmetric"),
+            K_d,
+            lambda value, what: positive_matrix(value, 3, what),
+        ),
+    )
+
+
+def _hysteresis(given: Any, gap: float) -> float:
+    """delta: at a critical point the other function is lower by the gap, so that a delta below it makes the law jump there."""
+    delta = gap / 2 if given is None else float(given)
+    if not 0 < delta < gap:
+        raise InputError(
+            f"hybrid_law: hysteresis = {delta:g} must lie between 0 and the gap {gap:.6g}: above it the law can stay"
+        )
+    return delta
+
+
+def _pull(
+    ops: Arithmetic,
+    derivation: GroupDerivation,
+    K: Matrix,
+    E: Matrix,
+    difference: Matrix,
+    axis: Vector,
+    kappa: float,
+    delta: float,
+    q: Scalar,
+) -> tuple[Vector, Scalar]:
+    """(d Phi_q, q) after the jump: of both functions the one that is taken.
+
+    Both are computed in every call, for C without branches; the derivative is that of the one chosen, so only its parts are selected, and the
+    chain rule d Phi_q = exp(q kappa phi u) d phi(T) + q kappa (d phi(T).u) d phi(E) is applied once.
+    """
+    phi, slope = _trace(K, E, difference)
+    sign = ops.where(ops.less(q, 0), ops.constant(-1), ops.constant(1))
+    here = _warped(ops, derivation, K, E, phi, axis, kappa, sign)
+    there = _warped(ops, derivation, K, E, phi, axis, kappa, -sign)
+    stays = ops.less(here[0] - there[0], ops.constant(delta))
+    chosen = ops.where(stays, sign, -sign)
+    turn = [[ops.where(stays, a, b) for a, b in zip(r, s, strict=True)] for r, s in zip(here[2], there[2], strict=True)]
+    at = [ops.where(stays, a, b) for a, b in zip(here[1], there[1], strict=True)]
+    return plus(matvec(turn, at), scaled(chosen * ops.constant(kappa) * dot(at, axis), slope)), chosen
 
 
 def _trace(K: Matrix, E: Matrix, difference: Matrix) -> tuple[Scalar, Vector]:

@@ -20,6 +20,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.control.manifold_formulas import read_formula, read_rows, symbols_of
 from lie_codegen.control.manifold_plant import ManifoldPlant, manifold_plant
+from lie_codegen.control.positive_solve import is_absent, solve_positive
 from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import current_budget, over
 from lie_codegen.exact.positive_matrix import real_number
@@ -187,7 +188,7 @@ class ManifoldPoint:
             along_x, along_y = matvec(slope, y), matvec(slope, x)
             total = plus(total, scaled(x[k], along_x), scaled(y[k], along_y))
             total[k] = total[k] - dot(x, along_x)
-        return [entry / 2 if not _is_zero(entry) else 0 for entry in total]
+        return [entry / 2 if not is_absent(entry) else 0 for entry in total]
 
     def bend(self, v: Vector) -> Vector:
         """(m,) (dJ.v) v."""
@@ -212,27 +213,6 @@ class ManifoldPoint:
         missing = [-b - a for a, b in zip(matvec(self.J, free), self.bend(v), strict=True)]
         weights = solve_positive(self.S, missing)
         return plus(free, *[scaled(w, column) for w, column in zip(weights, self.W, strict=True)])
-
-
-def _is_zero(x: Any) -> bool:
-    return isinstance(x, int) and x == 0
-
-
-def solve_positive(M: Matrix, b: Vector) -> Vector:
-    """M^-1 b for a symmetric positive definite M, by elimination without pivots."""
-    rows, right = [list(row) for row in M], list(b)
-    size = len(right)
-    for k in range(size):
-        for i in range(k + 1, size):
-            if _is_zero(rows[i][k]):
-                continue
-            factor = rows[i][k] / rows[k][k]
-            rows[i] = [*rows[i][: k + 1], *minus(rows[i][k + 1 :], scaled(factor, rows[k][k + 1 :]))]
-            right[i] = minus([right[i]], scaled(factor, [right[k]]))[0]
-    for k in reversed(range(size)):
-        rest = minus([right[k]], [dot(rows[k][k + 1 :], right[k + 1 :])])[0] if k + 1 < size else right[k]
-        right[k] = 0 if _is_zero(rest) else rest / rows[k][k]
-    return right
 
 
 @record_factory()

@@ -11,7 +11,7 @@ CIT-CDS 97-003, Theorem 4.2, (11), (13), (14), (29), (30).
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,38 +82,7 @@ def manifold_law(
         inputs = (Port("K_d", (manifold.size,) * 2, description="dissipation, symmetric"), *inputs)
     pair = _pair(manifold, phi, transport, K_d, S, named)
     _check(manifold, pair.at_numbers(inputs))
-    N, q, r = manifold.size, manifold.q, symbols_of("r", manifold.size)
-    slope = [sp.diff(pair.phi, x) for x in q]
-    v, w = symbols_of("v", N), symbols_of("w", N)
-    moved = list(pair.T * sp.Matrix(w))
-    by_q = [[sp.diff(entry, x) for x in q] for entry in moved]
-    by_r = [[sp.diff(entry, x) for x in r] for entry in moved]
-
-    def body(
-        ops: Arithmetic, at: Vector, speed: Vector, ref: Vector, rate: Vector, turn: Vector, *given: Any
-    ) -> tuple[Any, ...]:
-        values = dict(zip([*q, *v, *r, *w], [*at, *speed, *ref, *rate], strict=True)) | symbol_values(inputs, given)
-        evaluate = ExpressionEvaluator(ops, values)
-
-        def rows(matrix: Any) -> list[Vector]:
-            return [[0 if entry == 0 else evaluate(entry) for entry in row] for row in matrix]
-
-        point = manifold.at(ops, at)
-        nu = [evaluate(entry) for entry in moved]
-        T = rows(pair.T.tolist())
-        error = minus(speed, nu)
-        change = plus(matvec(rows(by_q), speed), matvec(rows(by_r), rate), matvec(T, turn))
-        damping = matvec(rows(pair.K_d.tolist()), error)
-        pull = plus(negative([evaluate(entry) for entry in slope]), negative(damping))
-        pull = plus(pull, [evaluate(sp.diff(manifold.potential, x)) for x in q])
-        if pair.S is not None:
-            pull = plus(pull, matvec(rows(pair.S.tolist()), error))
-        # M P (a + M^-1 g) = P^T (M a + g)
-        forward = plus(matvec(point.M, change), point.christoffel(speed, nu))
-        force = point.cotangent(plus(pull, forward))
-        value = evaluate(pair.phi)
-        energy = value + dot(error, matvec(point.M, error)) / 2
-        return force, value, energy, -dot(error, damping)
+    N = manifold.size
 
     def sampler(rng: random.Random) -> tuple[Any, ...]:
         draw = np.random.default_rng(rng.randrange(2**31))
@@ -148,7 +117,7 @@ def manifold_law(
             Port("W", (), description="phi + e.M e/2"),
             Port("W_dot", (), "1/s", description="-e.K_d e"),
         ),
-        body=body,
+        body=_body(manifold, pair, inputs),
         formula="F = P^T(-d_1 phi - K_d e) + M P D(T r')/dt + dV; e = q' - T r'",
         source="Bullo and Murray, CIT-CDS 97-003, Theorem 4.2, with the signs of (9) mended",
         sampler=sampler,
@@ -167,6 +136,45 @@ class _Pair:
         values = check_numbers(inputs)
         S = None if self.S is None else self.S.xreplace(values)
         return _Pair(self.phi.xreplace(values), self.T.xreplace(values), self.K_d.xreplace(values), S)
+
+
+def _body(manifold: Manifold, pair: _Pair, inputs: Sequence[Port]) -> Callable[..., tuple[Any, ...]]:
+    """The law over any arithmetic; what is differentiated is differentiated here, once."""
+    q, r = manifold.q, symbols_of("r", manifold.size)
+    v, w = symbols_of("v", manifold.size), symbols_of("w", manifold.size)
+    slope = [sp.diff(pair.phi, x) for x in q]
+    moved = list(pair.T * sp.Matrix(w))
+    by_q = [[sp.diff(entry, x) for x in q] for entry in moved]
+    by_r = [[sp.diff(entry, x) for x in r] for entry in moved]
+
+    def body(
+        ops: Arithmetic, at: Vector, speed: Vector, ref: Vector, rate: Vector, turn: Vector, *given: Any
+    ) -> tuple[Any, ...]:
+        values = dict(zip([*q, *v, *r, *w], [*at, *speed, *ref, *rate], strict=True)) | symbol_values(inputs, given)
+        evaluate = ExpressionEvaluator(ops, values)
+
+        def rows(matrix: Any) -> list[Vector]:
+            return [[0 if entry == 0 else evaluate(entry) for entry in row] for row in matrix]
+
+        point = manifold.at(ops, at)
+        nu = [evaluate(entry) for entry in moved]
+        T = rows(pair.T.tolist())
+        error = minus(speed, nu)
+        change = plus(matvec(rows(by_q), speed), matvec(rows(by_r), rate), matvec(T, turn))
+        damping = matvec(rows(pair.K_d.tolist()), error)
+        pull = plus(negative([evaluate(entry) for entry in slope]), negative(damping))
+        # The potential's own force acts on the body, so that the law gives it back: W counts phi alone.
+        pull = plus(pull, [evaluate(sp.diff(manifold.potential, x)) for x in q])
+        if pair.S is not None:
+            pull = plus(pull, matvec(rows(pair.S.tolist()), error))
+        # M P (a + M^-1 g) = P^T (M a + g): one projection for all forces, and no system with M to solve
+        forward = plus(matvec(point.M, change), point.christoffel(speed, nu))
+        force = point.cotangent(plus(pull, forward))
+        value = evaluate(pair.phi)
+        energy = value + dot(error, matvec(point.M, error)) / 2
+        return force, value, energy, -dot(error, damping)
+
+    return body
 
 
 def _pair(manifold: Manifold, phi: Any, transport: Any, K_d: Any, S: Any, parameters: Sequence[Parameter]) -> _Pair:

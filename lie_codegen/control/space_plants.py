@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.plants import Plant
+from lie_codegen.control.positive_solve import solve_positive
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression
 from lie_codegen.exact.positive_matrix import real_number
@@ -203,22 +204,6 @@ def mechanism_plant(
         return solve_positive(matrix, minus(command, [evaluate(entry) for entry in bias]))
 
     return SpacePlant(name, n, n, 2, acceleration)
-
-
-def solve_positive(M: Sequence[Sequence[Scalar]], b: Vector) -> Vector:
-    """M^-1 b for a symmetric positive definite M, by elimination: no pivot is zero there, and none is looked for."""
-    rows, right = [list(row) for row in M], list(b)
-    size = len(right)
-    for k in range(size):
-        inverse = 1 / rows[k][k]
-        for i in range(k + 1, size):
-            factor = rows[i][k] * inverse
-            rows[i] = minus(rows[i], scaled(factor, rows[k]))
-            right[i] = right[i] - factor * right[k]
-    for k in reversed(range(size)):
-        rest = right[k] - dot(rows[k][k + 1 :], right[k + 1 :]) if k + 1 < size else right[k]
-        right[k] = rest / rows[k][k]
-    return right
 
 
 def lagrangian_plant(system: LagrangianSystem) -> SpacePlant:
