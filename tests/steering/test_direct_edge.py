@@ -89,6 +89,22 @@ def test_shortest_ways_with_straight_arcs_are_reached_in_just_their_time(
             ((-1, 1, 1), (-1, -1, -1), (1, -1, -1), (-1, -1, 1)),
             (0.069033935, 1.963180075, 0.022570190, 0.9452158),
         ),
+        # what happens within one piece: a moment at the other bound; after another control has switched; and three controls there
+        (
+            "su3",
+            ("l1", "l4", "l6"),
+            None,
+            ((1, -1, -1), (1, -1, 1), (-1, -1, 1), (1, -1, 1)),
+            (1.908564, 1.227635, 0.007615, 0.879904),
+        ),
+        ("su3", ("l1", "l4", "l6"), None, ((1, -1, 1), (1, 1, -1), (1, 1, 1)), (3.232103, 0.009158, 0.653891)),
+        (
+            "su3",
+            ("l1", "l4", "l6"),
+            None,
+            ((-1, 1, 1), (1, 1, -1), (-1, 1, -1), (1, -1, -1)),
+            (0.396283, 1.543887, 0.01736, 1.048657),
+        ),
     ],
 )
 def test_arcs_shorter_than_a_piece_are_found_by_narrowing_the_bounds(

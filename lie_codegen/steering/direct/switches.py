@@ -39,6 +39,8 @@ _BRIEF = 2e-3
 _NEW = 0.01
 #: By how much arcs may miss the goal for one more to be tried, in units of its size: where one more was what lacked, they missed it by 3e-4.
 _MISSED = 0.02
+#: Words of at most that many controls are spelt in other ways, that many in all.
+_SPELLED, _SPELLINGS = 5, 120
 
 #: Durations (K,), controls (K, m), and which of these move (all where None).
 _Try = tuple[Array, Array, Array | None]
@@ -53,11 +55,17 @@ def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown,
     if not task.system.steady or not bounded or any(task.free_slots):
         return None
     scale = max(1.0, float(np.max(np.abs(task.end.values))))
+    words: list[tuple[float, Array, Array, int]] = []
     for u, variant in near:
         durations, letters = read_arcs(task, u)
-        flown = _flown(task, *_settled(task, durations, letters, np.zeros(letters.shape, dtype=bool), variant), variant)
+        arcs = _settled(task, durations, letters, np.zeros(letters.shape, dtype=bool), variant)
+        flown = _flown(task, *arcs, variant)
         if flown.miss <= _THERE * scale:
             return flown, variant
+        words.append((flown.miss, *arcs, variant))
+    respelt = _respelt(task, words, 1.5 * task.duration / len(near[0][0]), scale)
+    if respelt is not None:
+        return respelt
     for number, (u, variant) in enumerate(near):
         bang = np.where(u < (task.low + task.high) / 2, task.low, task.high)
         tries: list[_Try] = [(*_arcs(task, u, _BLUR), None), (*_arcs(task, bang, _BLUR), None)]
@@ -79,14 +87,57 @@ def switched(task: Manoeuvre, near: Sequence[tuple[Array, int]]) -> tuple[Flown,
     return None
 
 
+def _respelt(
+    task: Manoeuvre, words: Sequence[tuple[float, Array, Array, int]], brief: float, scale: float
+) -> tuple[Flown, int] | None:
+    """One of the nearest words of arcs (miss, durations, letters, variant) with other letters on its brief arcs, that ends at the goal.
+
+    What happens within one piece leaves its means alone: whether a control that leaves its bound for a moment does so before or after
+    another switches, or with it, they do not tell. Letters are changed one arc at a time, as long as that leads nearer.
+    """
+    if task.controls > _SPELLED:
+        return None
+    corners = np.array(list(product(*zip(task.low, task.high, strict=True))))
+    left, seen = _SPELLINGS, set[bytes]()
+    for miss, durations, letters, variant in sorted(words, key=lambda word: word[0]):
+        while miss <= _MISSED * scale:
+            durations, letters = _merged(durations, letters)
+            if letters.tobytes() in seen:
+                break
+            seen.add(letters.tobytes())
+            nearer: tuple[float, Array, Array] = (miss, durations, letters)
+            for place, corner in product(np.flatnonzero(durations < brief), corners):
+                if left == 0:
+                    return None
+                left -= 1
+                other = letters.copy()
+                other[place] = corner
+                arcs = _settled(task, durations, other, np.zeros(other.shape, dtype=bool), variant)
+                flown = _flown(task, *arcs, variant)
+                if flown.miss <= _THERE * scale:
+                    return flown, variant
+                if flown.miss < nearer[0]:
+                    nearer = (flown.miss, *arcs)
+            if nearer[0] == miss:
+                break
+            miss, durations, letters = nearer
+    return None
+
+
+def _merged(durations: Array, letters: Array) -> tuple[Array, Array]:
+    """Neighbours with the same letters as one arc."""
+    first = np.flatnonzero([True, *np.any(letters[1:] != letters[:-1], axis=1)])
+    return np.add.reduceat(durations, first), letters[first]
+
+
 def _settled(task: Manoeuvre, s: Array, v: Array, moving: Array | None, variant: int) -> tuple[Array, Array]:
-    """The arcs, brought as near to the goal as they come, without those that are all but gone."""
-    durations, controls = _solved(task, s, v, moving, variant)
+    """The arcs, brought as near to the goal as they come, without those that are all but gone where they do not get there."""
+    durations, controls, left = _solved(task, s, v, moving, variant)
     # the piece in which a switch was shrinks without end: the steps get on when it is gone
     long = durations > _BRIEF * task.duration
-    if not np.all(long) and np.any(long):
+    if left > _THERE and not np.all(long) and np.any(long):
         rest = None if moving is None else moving[long]
-        durations, controls = _solved(task, durations[long], controls[long], rest, variant)
+        durations, controls, _ = _solved(task, durations[long], controls[long], rest, variant)
     return durations, controls
 
 
@@ -155,8 +206,9 @@ def _programme(task: Manoeuvre, arcs: int) -> Programme:
     return programme_of(wide, table, np.arange(arcs), np.tile([1.0, 0.0], (arcs, 1)), np.ones(arcs))
 
 
-def _solved(task: Manoeuvre, s: Array, u: Array, moving: Array | None, variant: int) -> tuple[Array, Array]:
-    """Durations (K,) and controls (K, m), those `moving` or all, that end nearest to the goal and add up to the time there is."""
+def _solved(task: Manoeuvre, s: Array, u: Array, moving: Array | None, variant: int) -> tuple[Array, Array, float]:
+    """Durations (K,) and controls (K, m), those `moving` or all, that end nearest to the goal and add up to the time there is; by how
+    much they miss both."""
     m, arcs = task.controls, len(s)
     programme, goal = _programme(task, arcs), task.goal(np.array([variant]))
 
@@ -199,7 +251,7 @@ def _solved(task: Manoeuvre, s: Array, u: Array, moving: Array | None, variant: 
             x, r, J, damped = trial, new_r, new_J, max(damped / 5, 1e-13)
         else:
             damped *= 6
-    return x[:arcs], x[arcs:].reshape(arcs, m)
+    return x[:arcs], x[arcs:].reshape(arcs, m), float(np.linalg.norm(r))
 
 
 def _flown(task: Manoeuvre, durations: Array, controls: Array, variant: int) -> Flown:
