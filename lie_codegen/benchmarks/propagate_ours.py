@@ -1,4 +1,4 @@
-"""Rows of `lie-codegen bench propagate` of our own alone: a long run, loops with another inertia and by fixed steps."""
+"""Rows of `lie-codegen bench propagate` of our own alone: a long run, loops with another inertia and by fixed steps, single precision."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.loop_cases import START, loop_case, loop_error, states_of
+from lie_codegen.benchmarks.propagate_peers import chain_input
 from lie_codegen.control.attitude_law import attitude_law
 from lie_codegen.control.closed_loop import closed_loop
 from lie_codegen.flow.batched_exponential import expm
@@ -17,6 +18,10 @@ from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.signals.periodic_input import PeriodicInput
 
+#: Qubits of a chain, and how many of them are driven at once.
+_CHAINS = ((1, 4000), (2, 1000), (3, 200))
+#: What is asked for in both precisions; floats are good for it over such durations.
+_FLOATS = 1e-5
 #: what, who, rtol, seconds, error, build.
 Row = tuple[str, str, float, float, float, float]
 
@@ -49,6 +54,27 @@ def own_rows(say: Callable[[str], None]) -> Iterator[Row]:
         return np.append(run.X[1, 0].ravel(), run.xi[1, 0])
 
     yield timed("10,000 PD loops, 500 steps", 1e-6, by_steps, loop_error, repeats=2)
+    say("many chains in double and in single precision")
+    for qubits, members in _CHAINS:
+        yield from precision_rows(qubits, members)
+
+
+def precision_rows(qubits: int, members: int) -> Iterator[Row]:
+    """Members of one chain, all that drives them scaled, in both precisions to what floats can do; errors against 1e-10 in doubles."""
+    G, chain = chain_input(qubits)
+    given: dict[str, Any] = {"t": [0, 50], "eps": np.linspace(0.2, 1, members)}
+    exact = simulate(G, chain, rtol=1e-10, **given).X[-1]
+    for precision in ("double", "single"):
+
+        def run(precision: str = precision) -> Array:
+            X: Array = simulate(G, chain, rtol=_FLOATS, precision=precision, **given).X[-1]
+            return X
+
+        def error(X: Array) -> float:
+            return float(np.max(np.abs(X - exact)))
+
+        title = f"{members:,} x SU({2**qubits}), {precision}"
+        yield timed(title, _FLOATS, run, error, repeats=5)
 
 
 def timed(what: str, rtol: float, call: Callable[[], Array], error: Callable[[Array], float], repeats: int) -> Row:

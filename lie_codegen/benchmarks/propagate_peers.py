@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from lie_codegen.arrays import Array
 from lie_codegen.benchmarks.propagate_cases import Case, chain_case
 from lie_codegen.benchmarks.rows import AbsentError
 from lie_codegen.benchmarks.turns import answer, imported
+
+if TYPE_CHECKING:
+    from lie_codegen.groups.matrix_group import MatrixGroup
+    from lie_codegen.signals.periodic_input import PeriodicInput
 
 #: Gives the rows of X(T) of all members: (N, rows, d).
 Call = Callable[[], Array]
@@ -24,10 +28,8 @@ def ours(case: Case, rtol: float) -> Call:
     """lc.propagator of the qubits, lc.simulate of the chains."""
     from lie_codegen.flow.propagator import propagator
     from lie_codegen.flow.simulate import simulate
-    from lie_codegen.groups.catalogue_load import as_group, group
-    from lie_codegen.groups.pauli import pauli
+    from lie_codegen.groups.catalogue_load import group
     from lie_codegen.signals.parametric_input import ParametricInput
-    from lie_codegen.signals.periodic_input import PeriodicInput
 
     if case.qubits == 1:
         u = ParametricInput(("-s*cos(w*t)", "0", "-1"), ("s", "w"))
@@ -35,16 +37,25 @@ def ours(case: Case, rtol: float) -> Call:
         if len(case.scales) == 1:
             return lambda: U(s=1.0, w=1.1).X[None, :1]
         return lambda: U.batch(s=case.scales, w=1.1).X[:, :1]
-    G = as_group(pauli(case.qubits))  # type: ignore[arg-type]
+    G, chain = chain_input(case.qubits)
+    return lambda: simulate(G, chain, t=[0, case.duration], rtol=rtol).X[-1][None]
+
+
+def chain_input(qubits: int) -> tuple[MatrixGroup, PeriodicInput]:
+    """The group of that many qubits and what drives them, as our own functions take them."""
+    from lie_codegen.groups.catalogue_load import as_group
+    from lie_codegen.groups.pauli import pauli
+    from lie_codegen.signals.periodic_input import PeriodicInput
+
+    G = as_group(pauli(qubits))  # type: ignore[arg-type]
     texts = dict.fromkeys(G.labels, "0")
-    for k in range(case.qubits):
-        place = ["I"] * case.qubits
+    for k in range(qubits):
+        place = ["I"] * qubits
         texts["".join([*place[:k], "Z", *place[k + 1 :]])] = "-1"
         texts["".join([*place[:k], "X", *place[k + 1 :]])] = f"-cos({11 + 2 * k}*t/10)"
-    for k in range(case.qubits - 1):
-        texts["".join(["I"] * k + ["Z", "Z"] + ["I"] * (case.qubits - k - 2))] = "-6/10"
-    chain = PeriodicInput(tuple(texts.values()))
-    return lambda: simulate(G, chain, t=[0, case.duration], rtol=rtol).X[-1][None]
+    for k in range(qubits - 1):
+        texts["".join(["I"] * k + ["Z", "Z"] + ["I"] * (qubits - k - 2))] = "-6/10"
+    return G, PeriodicInput(tuple(texts.values()))
 
 
 def real_form(case: Case) -> tuple[Array, Array, Array]:

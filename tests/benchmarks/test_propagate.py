@@ -17,6 +17,7 @@ from lie_codegen.benchmarks import loop_peers, turns
 from lie_codegen.benchmarks.loop_cases import loop_case, loop_error
 from lie_codegen.benchmarks.propagate import PropagateRow, bench_propagate, missed, table, with_ratios
 from lie_codegen.benchmarks.propagate_cases import chain_case
+from lie_codegen.benchmarks.propagate_ours import precision_rows
 from lie_codegen.benchmarks.propagate_peers import ours, scipy
 from lie_codegen.errors import InputError
 
@@ -65,6 +66,14 @@ def test_a_case_runs_with_the_tools_at_hand(monkeypatch: pytest.MonkeyPatch) -> 
     assert "qubit" in table(rows, [])
     with pytest.raises(InputError, match="no system has 'so99' in its name; they are qubit"):
         bench_propagate(only="so99")
+
+
+def test_both_precisions_err_as_much_as_they_may() -> None:
+    double, single = precision_rows(2, 20)
+    assert [row[0] for row in (double, single)] == ["20 x SU(4), double", "20 x SU(4), single"]
+    assert double[4] < 1e-5
+    assert 1e-8 < single[4] < 1e-4  # floats know 6e-8 of a unit
+    assert min(double[3], single[3]) > 0
 
 
 def test_a_tool_that_is_absent_or_raises_says_so(capsys: pytest.CaptureFixture[str]) -> None:
