@@ -16,6 +16,9 @@ from lie_codegen.identifiers import shown
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 from lie_codegen.signals.resolved_input import resolve_function
 
+#: How far a value that is asked for alone may lie from the same among others, relative to the largest.
+_ALIKE = 1e-13
+
 
 @dataclass(frozen=True, eq=False)
 class Signal:
@@ -127,7 +130,12 @@ def _vectorised(group: MatrixGroup, u: Callable[[Any], Any], t: Array) -> Callab
     single = _numbers(group, u(float(probe[0])), "u(t)")
     if single.shape != (group.dim,):
         raise ShapeError(f"simulate({group.name}): u(t) has shape {single.shape}; it must be ({group.dim},)")
-    if together is not None and together.shape == expected and np.array_equal(together[0], single):
+    # a product of one row and of several is not rounded alike; whoever misreads an array of times is further off
+    if (
+        together is not None
+        and together.shape == expected
+        and np.allclose(together[0], single, rtol=0, atol=_ALIKE * np.max(np.abs(together), initial=0.0))
+    ):
         return lambda s: np.asarray(u(s), dtype=float)
     return lambda s: np.array([u(float(moment)) for moment in s], dtype=float).reshape(len(s), group.dim)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from lie_codegen.arrays import Array
@@ -42,24 +44,30 @@ def pullback(group: MatrixGroup, values: Array, lengths: Array, covector: Array)
 def _skew_part(group: MatrixGroup, C: Array) -> Array:
     """On a group of unitary matrices a covector sees the skew-Hermitian part alone; on a real group the real one."""
     matrix = np.asarray(C, dtype=complex) if group.is_complex else np.asarray(C).real.astype(float)
+    return np.asarray((matrix - matrix.conj().T) / 2 if _is_unitary(group) else matrix)
+
+
+@lru_cache(maxsize=32)
+def _is_unitary(group: MatrixGroup) -> bool:
     basis = np.asarray(group.basis)
-    if np.all(basis == -np.conj(np.swapaxes(basis, 1, 2))):
-        return np.asarray((matrix - matrix.conj().T) / 2)
-    return np.asarray(matrix)
+    return bool(np.all(basis == -np.conj(np.swapaxes(basis, 1, 2))))
 
 
 def _moved(C: Array, X: Array) -> Array:
-    """The covector before X of a covector after it: Re tr(C^H X^-1 hat(x) X) for all x."""
-    return np.asarray(np.linalg.solve(X.conj().T, C @ X.conj().T))
+    """The covector before X of a covector after it: Re tr(C^H X^-1 hat(x) X) for all x; of several X at once."""
+    star = np.swapaxes(X, -1, -2).conj()
+    return np.asarray(np.linalg.solve(star, C @ star))
 
 
 def _by_lanes(library: MagnusLibrary, values: Array, lengths: Array, C: Array) -> tuple[Array, Array]:
     products = library.lane_products(values, lengths, PROJECTION)
-    covectors = np.empty_like(products)
-    for lane in range(len(products) - 1, -1, -1):
-        covectors[lane] = C
-        C = _moved(C, products[lane])
-    return library.pullback(values, lengths, PROJECTION, covectors), C
+    # what follows each run, and last all of them: the covectors after the runs and before the first come from one solve
+    following = np.empty((len(products) + 1, *C.shape), products.dtype)
+    following[-1] = np.eye(len(C))
+    for lane in range(len(products), 0, -1):
+        np.matmul(products[lane - 1], following[lane], out=following[lane - 1])
+    covectors = _moved(C, following)
+    return library.pullback(values, lengths, PROJECTION, covectors[1:]), covectors[0]
 
 
 def _by_numpy(group: MatrixGroup, values: Array, lengths: Array, C: Array) -> tuple[Array, Array]:
