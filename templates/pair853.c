@@ -39,9 +39,30 @@ typedef struct {
     double *X_out, *y_out;          /* count x row x packed, count x row x size */
     double *knot_t, *knot_h, *knot_X, *knot_y; /* accepted steps, of one member; NULL if not wanted */
     ptrdiff_t room, knots;
-    double *work;                   /* members x (size x (STAGES + 3) + 2 packed + group) */
+    double *work;                   /* members x (size x (STAGES + 4) + 2 packed + group) */
     ptrdiff_t steps, rejected, evaluations;
 } Pair;
+
+/* The parts of `work`. */
+typedef struct {
+    double *k, *stage, *after, *more, *last; /* STAGES, 1, 1, 1 and 1 vectors of all members */
+    double *scratch, *aside, *theta;         /* elements twice, then Theta */
+} Room;
+
+static Room room_of(const Pair *p)
+{
+    const ptrdiff_t all = p->members * p->size, elements = p->members * p->packed;
+    Room room;
+    room.k = p->work;
+    room.stage = room.k + all * STAGES;
+    room.after = room.stage + all;
+    room.more = room.after + all;
+    room.last = room.more + all;
+    room.scratch = room.last + all;
+    room.aside = room.scratch + elements;
+    room.theta = room.aside + elements;
+    return room;
+}
 
 static void rates(Pair *p, const double *X, const double *y, double t, double *to)
 {
@@ -67,21 +88,22 @@ static void rates(Pair *p, const double *X, const double *y, double t, double *t
 }
 
 /* X <- X exp(Theta), Theta = 0. */
-static void settle(Pair *p, double *X, double *y, double *scratch)
+static void settle(Pair *p, double *X, double *y)
 {
-    double *theta = p->work + p->members * (p->size * (STAGES + 3) + 2 * p->packed), *out[1] = {scratch};
+    const Room room = room_of(p);
+    double *out[1] = {room.scratch};
     const double *in[2] = {X, y};
     if (p->members == 1 && p->move) {
         p->move(in, out);
     } else { /* lanes read samples that lie side by side */
         const ptrdiff_t strides[2] = {p->packed, p->group};
         for (ptrdiff_t m = 0; m < p->members; ++m) {
-            memcpy(theta + m * p->group, y + m * p->size, (size_t)p->group * sizeof(double));
+            memcpy(room.theta + m * p->group, y + m * p->size, (size_t)p->group * sizeof(double));
         }
-        in[1] = theta;
+        in[1] = room.theta;
         p->move_batch(p->members, in, strides, out);
     }
-    memcpy(X, scratch, (size_t)(p->members * p->packed) * sizeof(double));
+    memcpy(X, room.scratch, (size_t)(p->members * p->packed) * sizeof(double));
     for (ptrdiff_t m = 0; m < p->members; ++m) {
         memset(y + m * p->size, 0, (size_t)p->group * sizeof(double));
     }
@@ -112,14 +134,17 @@ static void advance(Pair *p, const double *X, const double *y, double t, double 
  */
 static double judged(const Pair *p, const double *y, const double *after, double h, const double *k)
 {
-    const ptrdiff_t all = p->members * p->size;
+    const Room room = room_of(p);
     double worst = 0.0;
+    pair_errors(k, p->members * p->size, room.more, room.last);
     for (ptrdiff_t m = 0; m < p->members; ++m) {
         double five = 0.0, three = 0.0, angle = 0.0;
         for (ptrdiff_t i = 0; i < p->size; ++i) {
             const ptrdiff_t at = m * p->size + i;
             const double a = fabs(y[at]), b = fabs(after[at]), size = i < p->group ? 1.0 : a > b ? a : b;
-            pair_error_add(k, all, at, p->atol + p->rtol * size, &five, &three);
+            const double units = 1.0 / (p->atol + p->rtol * size), e5 = units * room.more[at], e3 = units * room.last[at];
+            five += e5 * e5;
+            three += e3 * e3;
             angle += i < p->group ? after[at] * after[at] : 0.0;
         }
         const double error = pair_error(five, three, h, p->size);
@@ -159,7 +184,8 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps);
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
 {
     const ptrdiff_t all = p->members * p->size;
-    double *k = p->work, *stage = k + all * STAGES, *after = stage + all, *scratch = after + all;
+    const Room room = room_of(p);
+    double *k = room.k, *stage = room.stage, *after = room.after;
     int fresh = 0;
     p->knots = 0;
     rates(p, p->X, p->y, p->t, k);
@@ -207,15 +233,14 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
         }
         ++p->steps;
         if (!ends && gap <= h * (1 + 1e-10)) { /* a step of its own to the time within, from the same first stage */
-            double *state = stage, *X = scratch + p->members * p->packed;
-            double *next = X + p->members * p->packed;
+            double *X = room.aside, *next = room.more;
             memcpy(X, p->X, (size_t)(p->members * p->packed) * sizeof(double));
-            advance(p, p->X, p->y, p->t, gap, k, state, next);
-            settle(p, X, next, scratch);
+            advance(p, p->X, p->y, p->t, gap, k, stage, next);
+            settle(p, X, next);
             keep(p, X, next);
         }
         memcpy(p->y, after, (size_t)all * sizeof(double));
-        settle(p, p->X, p->y, scratch);
+        settle(p, p->X, p->y);
         if (ends) {
             p->t = p->times[p->next];
             p->t_low = 0.0;
@@ -239,15 +264,14 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
 EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out);
 EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out)
 {
-    double *k = p->work, *stage = k + p->size * STAGES, *after = stage + p->size, *scratch = after + p->size;
+    const Room room = room_of(p);
     for (ptrdiff_t c = 0; c < count; ++c) {
         const double *X = p->knot_X + knot[c] * p->packed, *y = p->knot_y + knot[c] * p->size, t = p->knot_t[knot[c]];
-        double *to = X_out + c * p->packed;
+        double *to = X_out + c * p->packed, *after = y_out + c * p->size;
         memcpy(to, X, (size_t)p->packed * sizeof(double));
-        rates(p, X, y, t, k);
-        advance(p, X, y, t, part[c] * p->knot_h[knot[c]], k, stage, after);
-        settle(p, to, after, scratch);
-        memcpy(y_out + c * p->size, after, (size_t)p->size * sizeof(double));
+        rates(p, X, y, t, room.k);
+        advance(p, X, y, t, part[c] * p->knot_h[knot[c]], room.k, room.stage, after);
+        settle(p, to, after);
     }
 }
 
@@ -273,7 +297,7 @@ EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts);
 EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts)
 {
     const ptrdiff_t n = p->size;
-    double *k = p->work, *stage = k + n * POINTS, *fresh = stage + n, *scratch = p->work + n * STAGES, *low = fresh + n;
+    double *k = p->work, *stage = k + n * POINTS, *fresh = stage + n, *low = fresh + n;
     const double start = p->t;
     for (ptrdiff_t i = 0; i < n; ++i) { low[i] = 0.0; }
     rates(p, p->X, p->y, p->t, k);
@@ -321,7 +345,7 @@ EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts)
         if (angle > p->reach * p->reach) {
             return STUCK;
         }
-        settle(p, p->X, p->y, scratch);
+        settle(p, p->X, p->y);
         ++p->steps;
         if ((step + 1) % parts == 0) {
             keep(p, p->X, p->y);

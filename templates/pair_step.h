@@ -14,30 +14,58 @@
 typedef int (*Slope)(const void *who, double t, const double *y, double *slope);
 
 /*
- * The slopes k_2 .. k_12 of a step of length h from (t, y), k_1 being known, and the state after it: n doubles each. Entry by entry a
- * sum over the stages in their order, so that the bits do not depend on who calls; `stage` may be `after`. Zero weights, half of
- * them, are passed over.
+ * Entries [first, first + WIDTH) of y + h sum_j a_j k_j, j < s, kept in registers: a sum over the stages in their order, so that the
+ * bits depend neither on who calls nor on the width. Zero weights, half of them, are passed over.
+ */
+#define PAIR_SUM(WIDTH)                                                                             \
+    static inline void pair_sum_##WIDTH(const double *a, int s, ptrdiff_t n, const double *k, const double *y, double h, double *to) \
+    {                                                                                               \
+        double sum[WIDTH];                                                                          \
+        int j, l;                                                                                   \
+        for (l = 0; l < WIDTH; ++l) {                                                               \
+            sum[l] = 0.0;                                                                           \
+        }                                                                                           \
+        for (j = 0; j < s; ++j) {                                                                   \
+            if (a[j] != 0.0) {                                                                      \
+                const double *from = k + j * n;                                                     \
+                for (l = 0; l < WIDTH; ++l) {                                                       \
+                    sum[l] += a[j] * from[l];                                                       \
+                }                                                                                   \
+            }                                                                                       \
+        }                                                                                           \
+        for (l = 0; l < WIDTH; ++l) {                                                               \
+            to[l] = y[l] + h * sum[l];                                                              \
+        }                                                                                           \
+    }
+PAIR_SUM(1)
+PAIR_SUM(2)
+PAIR_SUM(4)
+PAIR_SUM(8)
+
+/*
+ * The slopes k_2 .. k_12 of a step of length h from (t, y), k_1 being known, and the state after it: n doubles each. `stage` may be
+ * `after`.
  */
 static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const double *y, double h, double *k, double *stage, double *after)
 {
-    ptrdiff_t i;
-    int s, j;
+    int s;
     for (s = 1; s <= STAGES; ++s) {
         const double *a = s < STAGES ? A[s] : B;
         double *to = s < STAGES ? stage : after;
-        for (i = 0; i < n; ++i) {
-            to[i] = 0.0;
+        ptrdiff_t i = 0;
+        for (; i + 8 <= n; i += 8) {
+            pair_sum_8(a, s, n, k + i, y + i, h, to + i);
         }
-        for (j = 0; j < s; ++j) {
-            if (a[j] != 0.0) {
-                const double w = a[j], *from = k + j * n;
-                for (i = 0; i < n; ++i) {
-                    to[i] += w * from[i];
-                }
-            }
+        if (i + 4 <= n) {
+            pair_sum_4(a, s, n, k + i, y + i, h, to + i);
+            i += 4;
         }
-        for (i = 0; i < n; ++i) {
-            to[i] = y[i] + h * to[i];
+        if (i + 2 <= n) {
+            pair_sum_2(a, s, n, k + i, y + i, h, to + i);
+            i += 2;
+        }
+        if (i < n) {
+            pair_sum_1(a, s, n, k + i, y + i, h, to + i);
         }
         if (s < STAGES && slope(who, t + C[s] * h, stage, k + s * n)) {
             return 1;
@@ -46,17 +74,44 @@ static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const 
     return 0;
 }
 
-/* Entry `at` of n: the squares of its two error estimates in units of its scale are added. */
-static void pair_error_add(const double *k, ptrdiff_t n, ptrdiff_t at, double scale, double *five, double *three)
-{
-    double e5 = 0.0, e3 = 0.0;
-    int s;
-    for (s = 0; s < STAGES; ++s) {
-        e5 += E5[s] * k[s * n + at];
-        e3 += E3[s] * k[s * n + at];
+/* The two error estimates of entries [first, first + WIDTH) of n, stage after stage. */
+#define PAIR_ERRORS(WIDTH)                                                                          \
+    static inline void pair_errors_##WIDTH(const double *k, ptrdiff_t n, double *five, double *three) \
+    {                                                                                               \
+        double e5[WIDTH], e3[WIDTH];                                                                \
+        int s, l;                                                                                   \
+        for (l = 0; l < WIDTH; ++l) {                                                               \
+            e5[l] = e3[l] = 0.0;                                                                    \
+        }                                                                                           \
+        for (s = 0; s < STAGES; ++s) {                                                              \
+            const double *from = k + s * n;                                                         \
+            for (l = 0; l < WIDTH; ++l) {                                                           \
+                e5[l] += E5[s] * from[l];                                                           \
+                e3[l] += E3[s] * from[l];                                                           \
+            }                                                                                       \
+        }                                                                                           \
+        for (l = 0; l < WIDTH; ++l) {                                                               \
+            five[l] = e5[l];                                                                        \
+            three[l] = e3[l];                                                                       \
+        }                                                                                           \
     }
-    *five += e5 * e5 / (scale * scale);
-    *three += e3 * e3 / (scale * scale);
+PAIR_ERRORS(1)
+PAIR_ERRORS(2)
+PAIR_ERRORS(8)
+
+/* The two error estimates of all n entries. */
+static void pair_errors(const double *k, ptrdiff_t n, double *five, double *three)
+{
+    ptrdiff_t i = 0;
+    for (; i + 8 <= n; i += 8) {
+        pair_errors_8(k + i, n, five + i, three + i);
+    }
+    for (; i + 2 <= n; i += 2) {
+        pair_errors_2(k + i, n, five + i, three + i);
+    }
+    if (i < n) {
+        pair_errors_1(k + i, n, five + i, three + i);
+    }
 }
 
 /*

@@ -23,6 +23,7 @@ from lie_codegen.control.compatibility import check_compatibility
 from lie_codegen.control.error_catalogue import gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_inputs import input_parameters
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.control.physical_inertia import kept_physical
 from lie_codegen.control.reference_kernels import ReferenceBody
 from lie_codegen.control.reference_motion import Reference
@@ -31,7 +32,6 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix, real_number, symmetric_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import derivation_of
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, random_element
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic
@@ -196,7 +196,7 @@ def adaptive_law(
         guess=tuple(float(x) for x in a0),
         feedforward=feedforward,
     )
-    return nan_off_group(made, group, ("X", "X_d"))  # type: ignore[return-value]
+    return on_group_alone(made, group, ("X", "X_d"))  # type: ignore[return-value]
 
 
 def _basis(basis: Sequence[Any] | None, n: int) -> tuple[sp.ImmutableMatrix, ...]:

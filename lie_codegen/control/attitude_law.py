@@ -18,12 +18,12 @@ from lie_codegen.control.attitude_ports import (
     random_rotation,
     units_of_gains,
 )
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.control.reduced_attitude_law import reduced_law
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import group
 from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import jacobian
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.rotation_log import rotation_log
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import kernel_factory
@@ -97,7 +97,7 @@ def attitude_law(
             raise InputError("the attitude law 'pd' needs inertia and k_d")
         parameters = _parameters(inertia, k_p, k_d, tunable)
         law = replace(_proportional_derivative(parameters, gyroscopic, tracking), name=name or "attitude_pd")
-        return nan_off_group(law, group("so3"), ports)
+        return on_group_alone(law, group("so3"), ports)
     if inertia is not None:
         body_inertia_parameter(inertia, False)
     if k_d is not None:
@@ -111,7 +111,7 @@ def attitude_law(
             )
         made = reduced_law(gain, z)
     else:
-        made = nan_off_group(_proportional(gain, tracking), group("so3"), ports)
+        made = on_group_alone(_proportional(gain, tracking), group("so3"), ports)
     return replace(made, name=name or made.name)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.control.disturbance import ForceBody
-from lie_codegen.control.loop_arguments import loop_arguments
+from lie_codegen.control.loop_prepared import prepared
 from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.control.loop_simulation import loop_by, refuse
 from lie_codegen.errors import InputError
@@ -198,14 +198,15 @@ def closed_loop(
         "values": values, "plant": plant, "plant_values": plant_values, "compensate": compensate, "substeps": substeps,
     }  # fmt: skip
     refuse(of_mpc, "without mpc=; these options are those of a controller of lc.mpc")
-    told = loop_arguments(
-        group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step, sample=sample,
-        delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer, gains=gains, order=order,
-    )  # fmt: skip
     if order is not None and law is None:
         raise InputError(
             "closed_loop: order says what a law commands, and there is none: give law=, or leave order away"
         )
     if method not in ("auto", "gauss"):
         raise InputError(f'closed_loop: method is "auto" or "gauss", given {method!r}')
-    return loop_by(method, told, X0, xi0, gains or {}, states or {}, seed, runs, first, threads, events)
+    loop = prepared(
+        method, group=group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step,
+        sample=sample, delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer,
+        gains=gains, order=order,
+    )  # fmt: skip
+    return loop_by(method, loop, X0, xi0, states or {}, seed, runs, first, threads, events)

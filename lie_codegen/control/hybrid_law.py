@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.attitude_ports import random_rotation
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
 from lie_codegen.control.warp import gap_matrix, levels, warp_of, warped_level
 from lie_codegen.errors import InputError
@@ -32,7 +33,6 @@ from lie_codegen.exact.positive_matrix import as_floats, attitude_gain, body_ine
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.brackets import bracket
@@ -209,7 +209,7 @@ def hybrid_law(
         kappa_max=most,
         gain=tuple(tuple(float(x) for x in row) for row in gain),
     )
-    return nan_off_group(made, group, ("X", "X_d"))  # type: ignore[return-value]
+    return on_group_alone(made, group, ("X", "X_d"))  # type: ignore[return-value]
 
 
 def _parameters(inertia: Any, K_d: Any) -> tuple[Parameter, ...]:

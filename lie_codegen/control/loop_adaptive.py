@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +18,25 @@ from lie_codegen.flow.gauss_steps import gauss
 from lie_codegen.flow.pair853 import PairRun, integrate
 from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
+from lie_codegen.runtime.library import Library
 
 #: The relative part of a tolerance that is absolute: rounding.
 _ROUNDING = 1e-15
 
 
-def loop_system(run: Run) -> System:
+def loop_system(loop: Loop, library: Library, numbers: Mapping[str, Array]) -> System:
     """The loop as the pair integrates it."""
-    loop, library = run.loop, run.library
     moves = moves_of(loop)
     reach = min(reach_of(move.group, closed=move.derivation.closed_exponential) for move in moves)
-    names = [port.name for port in library.loop_rate.inputs[3:]]
     turns = sum(move.group.dim for move in moves)
-    return System(library.loop_rate, library.loop_settle, turns, reach, tuple(run.numbers[name] for name in names))
+    given = tuple(numbers[port.name] for port in library.loop_rate.inputs[3:])
+    return System(library.loop_rate, library.loop_settle, turns, reach, given)
+
+
+def _system(run: Run) -> System:
+    """That of a run which has one."""
+    assert run.system is not None, "asked of a loop without a rate"
+    return run.system
 
 
 def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
@@ -39,7 +45,7 @@ def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
     Raises:
         ComputationError: as `integrate`.
     """
-    system = loop_system(run)
+    system = _system(run)
     elements, vectors = columns(run.loop)
     start = run.start
     y0 = np.concatenate([np.zeros((len(start), system.group)), start[:, vectors]], axis=1)
@@ -62,9 +68,7 @@ def joined(loop: Loop, X: Array, y: Array) -> Array:
 
 def states_within(run: Run, pair: PairRun, t: Array) -> Array:
     """(k, m) states of one loop at any times of the run, by fresh steps from the knots before them."""
-    knots = np.clip(np.searchsorted(pair.knot_t, t, side="right") - 1, 0, len(pair.knot_t) - 1)
-    X, y = pair.within(loop_system(run), knots, (t - pair.knot_t[knots]) / pair.knot_h[knots])
-    return joined(run.loop, X, y)
+    return joined(run.loop, *pair.at(_system(run), t))
 
 
 def loop_events(run: Run, pair: PairRun, events: Sequence[Event]) -> tuple[EventHits, ...]:
@@ -81,7 +85,7 @@ def loop_events(run: Run, pair: PairRun, events: Sequence[Event]) -> tuple[Event
         raise InputError(f"{where}: events are of loops on groups")
     group = plant.group
     functions = [event_function(each, group.degree, group.is_complex, plant.sizes[1]) for each in events]
-    system = loop_system(run)
+    system = _system(run)
 
     def inside(step: NDArray[np.intp], part: Array) -> tuple[Array, Array | None]:
         X, y = pair.within(system, step, part)
@@ -100,7 +104,7 @@ def by_gauss(run: Run, parts: int) -> Array:
     Raises:
         ComputationError: as `gauss`.
     """
-    whole, (elements, vectors) = loop_system(run), columns(run.loop)
+    whole, (elements, vectors) = _system(run), columns(run.loop)
     found = []
     for k, state in enumerate(run.start):
         system = whole.of_members(k)

@@ -29,8 +29,13 @@ def called(
     now: Mapping[str, Any],
     numbers: Mapping[str, Any],
     seen: Any = None,
+    *,
+    within: bool = False,
 ) -> dict[str, Any]:
-    """What the law gives; X_d, xi_d and xi_d_dot are in `now` where there is a reference, `seen` is y where it was measured."""
+    """What the law gives; X_d, xi_d and xi_d_dot are in `now` where there is a reference, `seen` is y where it was measured.
+
+    With `within` all elements are known to be of the group, and the law is spared a look at each.
+    """
     law, plant = loop.law, loop.plant
     if law is None:
         return {}
@@ -48,7 +53,7 @@ def called(
             seen = seen_directions(ops, plant.group, inverse, law.directions)
         y = next(each.port for each in law.ports if each.kind == "direction")
         given["direction"] = seen if len(y.shape) == 2 else seen[0]
-    values = law.values(ops, given)
+    values = law.values(ops, given, within=within)
     command = values[law.command.name]
     return {**values, COMMAND: command if offset is None else plus(command, offset)}
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.loop_adaptive import loop_system
 from lie_codegen.control.loop_library import loop_library
 from lie_codegen.control.loop_run import Run, refined
 from lie_codegen.flow.pair853 import PairRun
@@ -79,8 +80,9 @@ class LoopOrigin(Saved):
         model = {name: made_from(each) for name, each in _read(self.loop)["parameters"].items()}
         reference = made_from(_read(self.reference)) if self.reference else None
         loop, library = loop_library(model, reference, self.kind)
+        system = loop_system(loop, library, self.numbers) if "loop_rate" in library.kernels else None
         run = Run(
-            loop, library, self.start, self.many, times, self.numbers, 1, self.sample, self.delay, self.noise
+            loop, library, self.start, self.many, times, self.numbers, 1, self.sample, self.delay, self.noise, system
         )  # fmt: skip
         pair = None
         if self.knots:
@@ -107,7 +109,7 @@ def loop_origin(making: LoopMaking, kind: str) -> LoopOrigin | None:
 
 def run_in_steps(run: Run, model: Mapping[str, Any], reference: Any) -> Run:
     """The same loop by equal steps: without a compiler, and as C to take home."""
-    return replace(run, library=loop_library(model, reference, "continuous")[1])
+    return replace(run, library=loop_library(model, reference, "continuous")[1], system=None)
 
 
 def narrower(run: Run, loops: Array) -> Run:

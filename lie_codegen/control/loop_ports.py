@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.control.guarded_law import evaluated_within
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import real_number
 from lie_codegen.groups.derivation import derivation_of
@@ -106,12 +107,15 @@ class LoopLaw:
         named = [order for order, names in _COMMANDS.items() if self.command.name in names]
         return named[0] if named else self.told or None
 
-    def values(self, ops: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-        """The outputs by name, from what the loop has: by the kind (of a reference and a state: by the name) of each input."""
+    def values(self, ops: Any, given: Mapping[str, Any], *, within: bool = False) -> dict[str, Any]:
+        """The outputs by name, from what the loop has: by the kind (of a reference and a state: by the name) of each input.
+
+        With `within` the law is not asked to refuse matrices off the group.
+        """
         arguments = [
             given[each.name if each.kind in (*STATES, "number") else each.rate or each.kind] for each in self.ports
         ]
-        found = self.kernel.evaluate(ops, *arguments)
+        found = evaluated_within(self.kernel, ops, *arguments) if within else self.kernel.evaluate(ops, *arguments)
         return dict(zip((port.name for port in self.kernel.outputs), found, strict=True))
 
 

@@ -72,7 +72,8 @@ def loop_rate(loop: Loop, reference: Any = None, name: str = "loop_rate") -> Ker
             command: Vector = [0] * plant.sizes[2]
             changes: dict[str, Any] = {}
             if loop.law is not None:
-                values = called(ops, loop, Y, eta, mine, now, given)
+                # products of exponentials within their reach: elements to rounding
+                values = called(ops, loop, Y, eta, mine, now, given, within=True)
                 command = limited(ops, loop, values[COMMAND], given)
                 changes = {each.name: values[each.rate] for each in mine if each.rate}
             push = plus(command, loop.push(ops, time, Y, eta, given))

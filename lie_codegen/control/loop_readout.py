@@ -15,6 +15,7 @@ from lie_codegen.control.loop_states import own_states
 from lie_codegen.flow.events import EventHits
 from lie_codegen.flow.pair853 import PairRun
 from lie_codegen.kernel.kernel import Port
+from lie_codegen.values import Later
 
 
 def result_of(
@@ -39,28 +40,38 @@ def result_of(
     loop, times = run.loop, run.times
     X, xi = loop.plant.split(found)
     states = own_states(loop, found, sampled=bool(run.sample))
-    outputs, u, moves = _outputs(run, found)
-    if run.sample and loop.law is not None:
-        u = np.ascontiguousarray(found[..., -loop.plant.sizes[2] :])
-    if loop.plant.order == 1 and u is not None:
-        xi = u
+    moves = run.reference(times)
+    made: list[tuple[dict[str, Array], Array | None]] = []
+
+    def said() -> tuple[dict[str, Array], Array | None]:
+        # what nobody asks for is not computed; who asks for one of the two gets both
+        if not made:
+            outputs, u = _outputs(run, found, moves)
+            if run.sample and loop.law is not None:
+                u = np.ascontiguousarray(found[..., -loop.plant.sizes[2] :])
+            made.append(({**outputs, **{name: value for name, value in states.items() if name not in outputs}}, u))
+        return made[0]
+
+    if loop.plant.order == 1 and loop.law is not None:
+        u = said()[1]
+        xi = xi if u is None else u
     gap = run.sample or float(times[1] - times[0])
     steps = pair.steps if pair is not None else count * round((times[-1] - times[0]) / gap)
     group = getattr(loop.plant, "group", None)
-    shared = {name: value for name, value in states.items() if name not in outputs}
     making = LoopMaking(run, told.model, told.reference, told.rtol, count, pair)
+    kind = told.kind if pair is None else "adaptive"
+    later: Any = (Later(lambda: said()[0]), Later(lambda: said()[1]), Later(lambda: loop_origin(making, kind)))
+    outputs, u_later, origin = later
     return ClosedLoop(
-        times, X, xi, {**outputs, **shared}, moves.get("X_d"), moves.get("xi_d"), steps, error, u, states, group, events,
-        loop_origin(making, told.kind if pair is None else "adaptive"),
-    )._made_by(making)  # fmt: skip
+        times, X, xi, outputs, moves.get("X_d"), moves.get("xi_d"), steps, error, u_later, states, group, events, origin
+    )._made_by(making)
 
 
-def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
-    """What the law gives at the times, its command within the limits, and the reference."""
+def _outputs(run: Run, found: Array, moves: dict[str, Array]) -> tuple[dict[str, Array], Array | None]:
+    """What the law gives at the times, and its command within the limits."""
     loop, times = run.loop, run.times
-    moves = run.reference(times)
     if loop.law is None:
-        return {}, None, moves
+        return {}, None
     inner = loop.extent(sampled=False)
     states = found[..., :inner]
     if run.sample:  # the own states as the law used them stand behind those that it will use next
@@ -81,7 +92,8 @@ def _outputs(run: Run, found: Array) -> tuple[dict[str, Array], Array | None, di
     flat = np.ascontiguousarray(states.reshape(-1, inner))
     made = run.sampled_at(kernel, flat, **{name: given[name] for name in names})
     values = {port.name: v.reshape(*shape, *v.shape[1:]) for port, v in zip(kernel.outputs, made, strict=True)}
-    return values, values.pop(kernel.outputs[-1].name), moves
+    command = values.pop(kernel.outputs[-1].name)
+    return values, command
 
 
 def _repeated(port: Port, values: Array, times: int) -> Array:

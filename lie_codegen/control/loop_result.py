@@ -17,7 +17,7 @@ from lie_codegen.control.loop_origin import LoopMaking, LoopOrigin
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import EventHits
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.values import settle
+from lie_codegen.values import Deferred, settle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,16 +44,16 @@ class ClosedLoop(Saved):
     t: Array
     X: Array
     xi: Array
-    outputs: dict[str, Array]
+    outputs: dict[str, Array] = Deferred()  # type: ignore[assignment]
     X_d: Array | None
     xi_d: Array | None
     steps: int
     error_estimate: float
-    u: Array | None = None
+    u: Array | None = Deferred(None)  # type: ignore[assignment]
     states: dict[str, Array] = field(default_factory=dict)
     group: Any = None
     events: tuple[EventHits, ...] = ()
-    origin: LoopOrigin | None = field(default=None, repr=False, compare=False)
+    origin: LoopOrigin | None = field(default=Deferred(None), repr=False, compare=False)  # type: ignore[assignment]
 
     @cached_property
     def error(self) -> Array:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_model import NOISE, Loop
 from lie_codegen.errors import ComputationError
+from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.rows import row_by_row
@@ -41,6 +42,7 @@ class Run:
         threads: over which loops are shared out.
         sample, delay: of a sampled law: seconds from call to call (0 for a continuous law), samples from a call to when it acts.
         noise: of a sampled law.
+        system: as the pair 8(5,3) integrates it, with these numbers; None where it has no smooth rate on groups.
     """
 
     loop: Loop
@@ -53,6 +55,7 @@ class Run:
     sample: float = 0.0
     delay: int = 0
     noise: NoiseStream = field(default_factory=lambda: NoiseStream(0, np.zeros(0, dtype=np.uint32)))
+    system: System | None = None
 
     def states(self, every: int) -> Array:
         """(k, N, m) or (k, m) states at the times; `every` steps between two times, or between two samples."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.control.curve_reference import CurveReference, check_curve
-from lie_codegen.control.loop_adaptive import adaptive, by_gauss, loop_events, loop_system
-from lie_codegen.control.loop_arguments import LoopArguments
-from lie_codegen.control.loop_library import loop_library, loop_numbers, several
+from lie_codegen.control.loop_adaptive import adaptive, by_gauss, loop_events
+from lie_codegen.control.loop_library import several
 from lie_codegen.control.loop_origin import narrower, run_in_steps
+from lie_codegen.control.loop_prepared import Prepared
 from lie_codegen.control.loop_readout import result_of
 from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.control.loop_run import Run, noise_stream, refined
@@ -35,14 +35,14 @@ def refuse(given: Mapping[str, Any], why: str) -> None:
 
 
 def loop_by(
-    method: str, told: LoopArguments, X0: ArrayLike | None, xi0: ArrayLike | None, gains: Mapping[str, ArrayLike],
-    states: Mapping[str, ArrayLike], seed: Any, runs: int | None, first: Any, threads: int, events: Sequence[Event],
+    method: str, loop: Prepared, X0: ArrayLike | None, xi0: ArrayLike | None, states: Mapping[str, ArrayLike], seed: Any,
+    runs: int | None, first: Any, threads: int, events: Sequence[Event],
 ) -> ClosedLoop:  # fmt: skip
-    """The loop that was told; see `closed_loop`."""
-    run = _run(method, told, X0, xi0, gains, states, seed, runs, first, threads)
-    library = run.library
+    """The loop that was prepared, from its start; see `closed_loop`."""
+    told, run = loop.told, _run(loop, X0, xi0, states, seed, runs, first, threads)
+    by_pair = run.system is not None and run.system.compiled
     if method == "gauss":
-        if told.step is None or "loop_rate" not in library.kernels or not loop_system(run).compiled:
+        if told.step is None or not by_pair:
             raise InputError(
                 'closed_loop: method="gauss" is of a law that acts continuously on a group; give it a step'
             )
@@ -50,42 +50,42 @@ def loop_by(
             raise InputError("closed_loop: events go with rtol, not with method='gauss'")
         equal = run_in_steps(run, told.model, told.reference)
         return result_of(equal, told, by_gauss(run, told.parts), told.parts, float("nan"))
-    if events and (told.step is not None or "loop_rate" not in library.kernels or not loop_system(run).compiled):
+    if events and (told.step is not None or not by_pair):
         raise InputError(
             "closed_loop: events are of a law that acts continuously on a group, with rtol; not with step or sample"
         )
     if told.step is not None:
         return result_of(run, told, run.states(told.parts), told.parts, float("nan"))
-    if "loop_rate" in library.kernels:
-        if loop_system(run).compiled:
-            found, pair = adaptive(run, told.rtol)
-            hits = loop_events(run, pair, events) if events else ()
-            return result_of(run, told, found, 0, pair.error_estimate, pair, hits)
+    if by_pair:
+        found, pair = adaptive(run, told.rtol)
+        hits = loop_events(run, pair, events) if events else ()
+        return result_of(run, told, found, 0, pair.error_estimate, pair, hits)
+    if run.system is not None:
         run = run_in_steps(run, told.model, told.reference)
     found, count, error = refined(run, told.rtol, narrower)
     return result_of(run, told, found, count, error)
 
 
 def _run(
-    method: str, told: LoopArguments, X0: ArrayLike | None, xi0: ArrayLike | None, gains: Mapping[str, ArrayLike],
-    states: Mapping[str, ArrayLike], seed: Any, runs: int | None, first: Any, threads: int,
+    loop: Prepared, X0: ArrayLike | None, xi0: ArrayLike | None, states: Mapping[str, ArrayLike], seed: Any, runs: int | None,
+    first: Any, threads: int,
 ) -> Run:  # fmt: skip
     """The compiled loop with its numbers and its start."""
-    by_rate = told.kind == "continuous" and (told.step is None or method == "gauss")
-    chosen_kind = "adaptive" if by_rate else told.kind
-    loop, library = loop_library(told.model, told.reference, chosen_kind)
-    numbers, loops = loop_numbers(loop, told.inertia, gains, told.numbers)
+    told, model, library = loop.told, loop.loop, loop.library
     if told.reference is not None:
         ends = float(told.times[0]), float(told.times[-1])
         if isinstance(told.reference, CurveReference):
             check_curve(told.reference, *ends, library.reference.batch)
         else:
             check_once(told.reference, *ends, library.reference)
-    start, many = loop.plant.starts(X0, xi0)
-    start, many = several(start, many, loops, runs)
-    start = initial_own(loop, start, {**told.start, **states})
-    stream = noise_stream(loop, _whole(seed, "seed", 0), _whole(first, "first", 0))
-    return Run(loop, library, start, many, told.times, numbers, threads, told.sample or 0.0, told.delay, stream)
+    start, many = model.plant.starts(X0, xi0)
+    start, many = several(start, many, loop.loops, runs)
+    start = initial_own(model, start, {**told.start, **states})
+    stream = noise_stream(model, _whole(seed, "seed", 0), _whole(first, "first", 0))
+    sample = told.sample or 0.0
+    return Run(
+        model, library, start, many, told.times.copy(), loop.numbers, threads, sample, told.delay, stream, loop.system
+    )
 
 
 def _whole(value: Any, name: str, default: int) -> int:

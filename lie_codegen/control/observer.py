@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.control.observed_vectors import (
     acting_matrices,
     known_value,
@@ -37,7 +38,6 @@ from lie_codegen.exact.positive_matrix import positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.maps.exponential import exp_matrix
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, real_rows, velocity_units
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -235,7 +235,7 @@ def observer(
         k_i=known_value(parameters[2]),
         measured=seen,
     )
-    return nan_off_group(made, group, ("X_hat",))  # type: ignore[return-value]
+    return on_group_alone(made, group, ("X_hat",))  # type: ignore[return-value]
 
 
 def corrections(

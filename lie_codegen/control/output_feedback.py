@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.attitude_ports import random_rotation
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import as_floats, body_inertia, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.maps.admission import admitted
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import matrix_port
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.definition import doubles, kernel_factory
@@ -220,7 +220,7 @@ def output_feedback_law(
         targets=tuple(tuple(map(float, row)) for row in wanted),
         r=tuple(float(each) for each in parameters[0].value or ()),
     )
-    return nan_off_group(made, group, ("X_hat",))  # type: ignore[return-value]
+    return on_group_alone(made, group, ("X_hat",))  # type: ignore[return-value]
 
 
 def _units(rows: Any, name: str) -> Array:

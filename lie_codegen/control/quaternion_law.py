@@ -14,12 +14,12 @@ import random
 from typing import Any
 
 from lie_codegen.control.attitude_ports import random_rotation
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.control.tracking_law import FEEDFORWARDS, feedforward_force, motion_ports
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix, positive_number
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import derivation_of
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.rotation_log import quaternion_of
 from lie_codegen.groups.units import force_units
 from lie_codegen.kernel.arithmetic import Arithmetic
@@ -121,7 +121,7 @@ def quaternion_law(
         source="Mayhew, Sanfelice and Teel, IEEE Trans. Automatic Control 56 (2011)",
         sampler=sampler,
     )
-    return nan_off_group(made, group, ("X", "X_d"))
+    return on_group_alone(made, group, ("X", "X_d"))
 
 
 def _fraction(value: Any, what: str) -> Any:

@@ -28,11 +28,11 @@ from lie_codegen.control.error_catalogue import error_names, gain, law_error
 from lie_codegen.control.error_derivatives import ErrorDerivatives
 from lie_codegen.control.error_inputs import input_parameters
 from lie_codegen.control.force_limits import force_limits
+from lie_codegen.control.guarded_law import on_group_alone
 from lie_codegen.errors import InputError
 from lie_codegen.exact.positive_matrix import body_inertia, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import derivation_of
-from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, random_element, velocity_units
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.matrix_pattern import RealMatrices
@@ -159,7 +159,7 @@ def tracking_law(
         source="Bullo and Murray, CIT-CDS 97-003, (28), (29), Theorem 4.2",
         sampler=sampler,
     )
-    return nan_off_group(law, group, ("X", "X_d"))
+    return on_group_alone(law, group, ("X", "X_d"))
 
 
 def _inertia(group: MatrixGroup, inertia: Any) -> sp.ImmutableMatrix:

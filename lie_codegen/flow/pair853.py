@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, replace
+from math import nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,14 @@ from lie_codegen.flow.pair_library import FULL, LOST, STUCK, compiled_pair
 from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.threads import share_out
 
-#: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots.
-_STEPS = 4096
+#: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots, at first for fewer.
+_STEPS, _FIRST_STEPS = 4096, 256
 #: Members that go with one step size: enough for lanes, few enough for the cache; and of the pilot.
 _BLOCK, _PILOT = 64, 16
 #: The run that is given has local errors so much smaller than the one it is compared with.
-_RATIO = 8.0
+_RATIO = 16.0
+#: Times at which two runs of a single member are compared: those of the longer steps need not end at all that were asked for.
+_COMPARED = 16
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
@@ -58,8 +61,8 @@ class PairRun:
         at = np.ascontiguousarray(knots, dtype=np.intp)
         part = np.ascontiguousarray(parts, dtype=float)
         X, y = np.empty((len(at), system.packed)), np.empty((len(at), system.size))
-        work = system.work(1)
         given, _kept = system.record(1)
+        work = system.work(1)
         given.knot_t, given.knot_h = self.knot_t.ctypes.data, self.knot_h.ctypes.data
         given.knot_X, given.knot_y, given.work = self.knot_X.ctypes.data, self.knot_y.ctypes.data, work.ctypes.data
         library = compiled_pair()
@@ -67,6 +70,11 @@ class PairRun:
             ctypes.addressof(given), len(at), at.ctypes.data, part.ctypes.data, X.ctypes.data, y.ctypes.data
         )
         return X, y
+
+    def at(self, system: System, times: Array) -> tuple[Array, Array]:
+        """X and y at times within the run of a single member."""
+        knots = np.searchsorted(self.knot_t, times, side="right") - 1
+        return self.within(system, knots, (times - self.knot_t[knots]) / self.knot_h[knots])
 
 
 def integrate(
@@ -111,74 +119,105 @@ def integrate(
 def _to_tolerance(
     system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str
 ) -> tuple[PairRun, tuple[float, float]]:
-    """A run whose difference to one with larger local errors says that it is good enough, and its local tolerances."""
+    """A run whose difference to one with larger local errors says that it is good enough, and its local tolerances.
+
+    Of several members, which are a pilot, the run with the larger local errors is given where it is good enough itself.
+    """
     # The error of a run is in proportion to its local tolerance: of two whose tolerances differ by a factor r the
-    # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
-    share = 1.0
-    coarse = _once(system, X0, y0, times, rtol, atol + rtol, where)
+    # better errs by about their difference over r - 1, the other by r times that. Twice that is reported, for
+    # proportion is not exact.
+    share, one = 1.0, len(X0) == 1
+    # the last time and those a whole number of places before it, but for the first
+    apart = -(-(len(times) - 1) // _COMPARED) if one else 1
+    compared = slice((len(times) - 1) % apart or apart, None, apart)
+    larger = rtol, atol + rtol
+    coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), *larger, where)
+    X, y = coarse.X[1:], coarse.y[1:]
     for _ in range(_MOST_RUNS):
         share /= _RATIO
         local = max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST)
         fine = _once(system, X0, y0, times, *local, where)
         with np.errstate(invalid="ignore"):
-            difference = max(float(np.max(np.abs(a - b))) for a, b in ((fine.X, coarse.X), (fine.y, coarse.y)))
-        scale = max(1.0, float(np.max(np.abs(fine.X))), float(np.max(np.abs(fine.y))))
+            difference = max(_size(fine.X[compared] - X), _size(fine.y[compared] - y))
+        scale = max(1.0, _size(fine.X), _size(fine.y))
         estimate = 2 * difference / (_RATIO - 1)
         # Rounding: no run of so many steps knows its states better.
-        floor = 1e-15 * scale * np.sqrt(fine.steps)
-        if estimate <= max(rtol * scale, atol, floor):
+        floor = 1e-15 * scale * sqrt(fine.steps)
+        goal = max(rtol * scale, atol, floor)
+        if estimate <= goal:
+            if not one and _RATIO * estimate <= goal:
+                return replace(coarse, error_estimate=max(_RATIO * estimate, floor)), larger
             return replace(fine, error_estimate=max(estimate, floor)), local
         if local[1] <= _SMALLEST:
             break
         needed = estimate / max(rtol * scale, atol)
         if needed > _RATIO**2:  # far off: the next pair starts there
             share /= min(needed / _RATIO, 1e4)
-            fine = _once(
-                system, X0, y0, times, max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST), where
-            )
-        coarse = fine
+            local = max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST)
+            fine = _once(system, X0, y0, times, *local, where)
+        coarse, larger, X, y = fine, local, fine.X[compared], fine.y[compared]
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
     )
 
 
+def _size(of: Array) -> float:
+    """The largest entry; NaN where one is."""
+    return float(np.abs(of).max())
+
+
 def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
     """One run of some members with one step size."""
-    N, k, one = len(X0), len(times), len(X0) == 1
+    N, one = len(X0), len(X0) == 1
+    packed, size, k = system.packed, system.size, len(times)
     given, _kept = system.record(N)
-    X, y = np.array(X0, dtype=float), np.array(y0, dtype=float)
-    X_out, y_out = np.empty((k, N, system.packed)), np.empty((k, N, system.size))
-    X_out[0], y_out[0] = X, y
-    later = np.ascontiguousarray(times[1:], dtype=float)
-    work = system.work(N)
+    X_out, y_out = np.empty((k, N, packed)), np.empty((k, N, size))
+    X_out[0], y_out[0] = X0, y0
+    # one block of memory: the state, the times behind the first, what a step works with
+    state = N * (packed + size)
+    block = np.empty(state + k - 1 + system.work_size(N))
+    block[: N * packed], block[N * packed : state], block[state : state + k - 1] = X0.ravel(), y0.ravel(), times[1:]
+    at = block.ctypes.data
     given.t, given.h, given.rtol, given.atol = float(times[0]), 0.0, rtol, atol
     given.reach, given.longest = system.reach, float(times[-1] - times[0])
-    given.X, given.y, given.times, given.count, given.row = X.ctypes.data, y.ctypes.data, later.ctypes.data, k - 1, N
-    given.X_out, given.y_out, given.work = X_out[1:].ctypes.data, y_out[1:].ctypes.data, work.ctypes.data
+    given.X, given.y, given.times, given.work = at, at + 8 * N * packed, at + 8 * state, at + 8 * (state + k - 1)
+    given.count, given.row = k - 1, N
+    given.X_out, given.y_out = X_out.ctypes.data + 8 * N * packed, y_out.ctypes.data + 8 * N * size
     knots: list[tuple[Array, ...]] = []
-    library = compiled_pair()
-    status = FULL
+    library, status, room = compiled_pair(), FULL, min(_FIRST_STEPS, _STEPS)
     while status == FULL:
-        room = (np.empty(_STEPS), np.empty(_STEPS), np.empty((_STEPS, system.packed)), np.empty((_STEPS, system.size)))
         if one:
-            given.knot_t, given.knot_h, given.knot_X, given.knot_y = (each.ctypes.data for each in room)
-            given.room = _STEPS
-        status = library.pair_run(ctypes.addressof(given), _STEPS)
-        knots.append(tuple(each[: given.knots].copy() for each in room))
+            rows = np.empty(room * (2 + packed + size))
+            first, given.room = rows.ctypes.data, room
+            given.knot_t, given.knot_h = first, first + 8 * room
+            given.knot_X, given.knot_y = first + 16 * room, first + 8 * room * (2 + packed)
+        status = library.pair_run(ctypes.addressof(given), room)
+        if one:
+            knots.append(_rows(rows, room, given.knots, packed, size))
         if given.steps + given.rejected > _MOST_STEPS:
             raise ComputationError(
                 f"{where}: {_MOST_STEPS} steps do not bring the error below {atol:g} beyond t = {given.t:.9g}, or the state grows "
                 "without bound; shorten the time, loosen the tolerance, or check the gains"
             )
+        room = _STEPS
     if status == LOST:
         raise ComputationError(
             f"{where}: the state is no longer finite behind t = {given.t:.9g}; check the gains, or shorten the time"
         )
     if status == STUCK:
         raise ComputationError(f"{where}: no step is short enough at t = {given.t:.9g}; is the force smooth there?")
-    kept = tuple(np.concatenate([each[j] for each in knots]) for j in range(4)) if one else _no_knots(system)
-    return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, float("nan"), *kept)
+    kept = _no_knots(system)
+    if one:
+        kept = knots[0] if len(knots) == 1 else tuple(np.concatenate(each) for each in zip(*knots, strict=True))  # type: ignore[assignment]
+    return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, nan, *kept)
+
+
+def _rows(rows: Array, room: int, count: int, packed: int, size: int) -> tuple[Array, Array, Array, Array]:
+    """Copies of t, h, X and y of so many knots of a block with room for more."""
+    t, h, rest = rows[:count], rows[room : room + count], rows[2 * room :]
+    X, y = rest[: count * packed], rest[room * packed : room * packed + count * size]
+    return t.copy(), h.copy(), X.reshape(count, packed).copy(), y.reshape(count, size).copy()
 
 
 def _no_knots(system: System) -> tuple[Array, Array, Array, Array]:

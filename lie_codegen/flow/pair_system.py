@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,17 +33,17 @@ class System:
     reach: float
     numbers: tuple[Array, ...] = ()
 
-    @property
+    @cached_property
     def packed(self) -> int:
         """Doubles of X."""
         return int(self.rate.inputs[0].size)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Doubles of y."""
         return int(self.rate.inputs[1].size)
 
-    @property
+    @cached_property
     def compiled(self) -> bool:
         """Whether compiled loops can call it."""
         return bool(self.rate.backend.address(many=False)) and pair_library() is not None
@@ -52,9 +53,23 @@ class System:
         kept = [v[which] if self._is_own(k) else v for k, v in enumerate(self.numbers)]
         return replace(self, numbers=tuple(kept))
 
+    def work_size(self, members: int) -> int:
+        """Doubles that a step of so many members works with, as templates/pair853.c lays them out."""
+        return members * (self.size * (STAGES + 4) + 2 * self.packed + self.group)
+
     def work(self, members: int) -> Array:
-        """Room for a step of so many members, as templates/pair853.c lays it out."""
-        return np.empty(members * (self.size * (STAGES + 3) + 2 * self.packed + self.group))
+        """Room for a step of so many members."""
+        return np.empty(self.work_size(members))
+
+    @cached_property
+    def _one(self) -> tuple[int, int]:
+        """Where rate and move of one member are."""
+        return self.rate.backend.address(many=False), self.move.backend.address(many=False)
+
+    @cached_property
+    def _many(self) -> tuple[int, int]:
+        """Where those of many are, which are compiled when they are first asked for."""
+        return self.rate.backend.address(many=True), self.move.backend.address(many=True)
 
     def record(self, members: int) -> tuple[Pair, Sequence[Any]]:
         """The system as the C reads it, and what has to stay."""
@@ -62,13 +77,14 @@ class System:
         strides = [v[0].size if self._is_own(k) else 0 for k, v in enumerate(numbers)]
         pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(v.ctypes.data for v in numbers))
         moves = (ctypes.c_ssize_t * max(1, len(numbers)))(*strides)
-        rate, move = self.rate.backend, self.move.backend
-        single = members == 1
-        given = Pair(
-            rate=rate.address(many=False) if single else None, move=move.address(many=False) if single else None,
-            rate_batch=None if single else rate.address(many=True), move_batch=None if single else move.address(many=True),
-            members=members, packed=self.packed, group=self.group, size=self.size, numbers=len(numbers),
-            number=ctypes.addressof(pointers), number_stride=ctypes.addressof(moves),
+        given, single = Pair(), members == 1
+        if single:
+            given.rate, given.move = self._one
+        else:
+            given.rate_batch, given.move_batch = self._many
+        given.members, given.packed, given.group, given.size = members, self.packed, self.group, self.size
+        given.numbers, given.number, given.number_stride = (
+            len(numbers), ctypes.addressof(pointers), ctypes.addressof(moves)
         )  # fmt: skip
         return given, (numbers, pointers, moves)
 

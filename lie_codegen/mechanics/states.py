@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError
@@ -34,10 +36,17 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
     count = max(counts, default=1)
     X = admitted(group, X, "X0").X if X.ndim == 2 else admitted_all(group, X, "X0")[0]
     X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
-    rows, columns = np.array(varying_entries(group)).T
+    rows, columns = _places(group)
     entries = np.ascontiguousarray(X[:, rows, columns])
     flat = entries.view(float) if group.is_complex else entries
-    return np.ascontiguousarray(np.concatenate([flat.reshape(count, -1), xi], axis=1)), many
+    return np.concatenate([flat.reshape(count, -1), xi], axis=1), many
+
+
+@lru_cache(maxsize=128)
+def _places(group: MatrixGroup) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of the entries that vary."""
+    rows, columns = np.array(varying_entries(group), dtype=np.intp).T
+    return rows, columns
 
 
 def split_states(group: MatrixGroup, states: Array) -> tuple[Array, Array]:
@@ -45,9 +54,11 @@ def split_states(group: MatrixGroup, states: Array) -> tuple[Array, Array]:
     size = packed_size(group)
     packed = np.ascontiguousarray(states[..., :size])
     values = packed.view(complex) if group.is_complex else packed
-    X = np.broadcast_to(
-        np.eye(group.degree, dtype=values.dtype), (*states.shape[:-1], group.degree, group.degree)
-    ).copy()
-    rows, columns = np.array(varying_entries(group)).T
+    shape = *states.shape[:-1], group.degree, group.degree
+    rows, columns = _places(group)
+    xi = np.ascontiguousarray(states[..., size : size + group.dim])
+    if len(rows) == group.degree**2:  # row by row, as they stand in the matrix; not the states' own memory
+        return (values.copy() if values.base is not None else values).reshape(shape), xi
+    X = np.broadcast_to(np.eye(group.degree, dtype=values.dtype), shape).copy()
     X[..., rows, columns] = values
-    return X, np.ascontiguousarray(states[..., size : size + group.dim])
+    return X, xi
