@@ -10,7 +10,6 @@ from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.kernel import Body, Kernel
-from lie_codegen.runtime.recorded_kernels import own_body
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +31,12 @@ class GuardedBody:
 def on_group_alone(law: Kernel, group: MatrixGroup, ports: Iterable[str]) -> Kernel:
     """The law with NaN for all outputs where the matrix of one of the ports is not of the group; see `nan_off_group`."""
     return replace(law, body=GuardedBody(nan_off_group(law, group, ports).body, law.body))
+
+
+def own_body(law: Kernel) -> Body:
+    """The body that its factory gave a law. One from a record of the cache has a method of what makes the law when it is called."""
+    made = getattr(getattr(law.body, "__self__", None), "kernel", None)
+    return own_body(made) if isinstance(made, Kernel) else law.body
 
 
 def evaluated_within(law: Kernel, ops: Arithmetic, *arguments: Any) -> tuple[Any, ...]:

@@ -20,6 +20,16 @@ from lie_codegen.kernel.saved import Saved
 from lie_codegen.values import Deferred, settle
 
 
+class _Absent(Deferred):
+    """A deferred field with options of its own: its default comes as the descriptor itself, and is None."""
+
+    def __init__(self) -> None:
+        super().__init__(None)
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        super().__set__(owner, None if value is self else value)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedLoop(Saved):
     """A motion under a law: X' = X hat(xi), I xi' = ad*_xi I xi + f, or X' = X hat(u).
@@ -45,15 +55,16 @@ class ClosedLoop(Saved):
     X: Array
     xi: Array
     outputs: dict[str, Array] = Deferred()  # type: ignore[assignment]
-    X_d: Array | None
-    xi_d: Array | None
-    steps: int
-    error_estimate: float
+    # what stands there in the class is no default: a descriptor, which lets a field be made when it is asked for
+    X_d: Array | None  # type: ignore[misc]
+    xi_d: Array | None  # type: ignore[misc]
+    steps: int  # type: ignore[misc]
+    error_estimate: float  # type: ignore[misc]
     u: Array | None = Deferred(None)  # type: ignore[assignment]
     states: dict[str, Array] = field(default_factory=dict)
     group: Any = None
     events: tuple[EventHits, ...] = ()
-    origin: LoopOrigin | None = field(default=Deferred(None), repr=False, compare=False)  # type: ignore[assignment]
+    origin: LoopOrigin | None = field(default=_Absent(), repr=False, compare=False)  # type: ignore[assignment]
 
     @cached_property
     def error(self) -> Array:

@@ -21,8 +21,10 @@ from lie_codegen.runtime.threads import share_out
 
 #: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots, at first for fewer.
 _STEPS, _FIRST_STEPS = 4096, 256
-#: Members that go with one step size: enough for lanes, few enough for the cache; and of the pilot.
-_BLOCK, _PILOT = 64, 16
+#: Members that go with one step size: enough for lanes, few enough for the cache.
+_BLOCK = 64
+#: Members of the pilot, and how many times more than the worst of them others may err.
+_PILOT, _MARGIN = 16, 4.0
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 16.0
 #: Times at which two runs of a single member are compared: those of the longer steps need not end at all that were asked for.
@@ -121,17 +123,16 @@ def _to_tolerance(
 ) -> tuple[PairRun, tuple[float, float]]:
     """A run whose difference to one with larger local errors says that it is good enough, and its local tolerances.
 
-    Of several members, which are a pilot, the run with the larger local errors is given where it is good enough itself.
+    Of several members, which are a pilot, the tolerances are those with which others like them are good enough, with the error
+    that is then allowed for.
     """
     # The error of a run is in proportion to its local tolerance: of two whose tolerances differ by a factor r the
-    # better errs by about their difference over r - 1, the other by r times that. Twice that is reported, for
-    # proportion is not exact.
+    # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
     share, one = 1.0, len(X0) == 1
     # the last time and those a whole number of places before it, but for the first
     apart = -(-(len(times) - 1) // _COMPARED) if one else 1
     compared = slice((len(times) - 1) % apart or apart, None, apart)
-    larger = rtol, atol + rtol
-    coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), *larger, where)
+    coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), rtol, atol + rtol, where)
     X, y = coarse.X[1:], coarse.y[1:]
     for _ in range(_MOST_RUNS):
         share /= _RATIO
@@ -145,9 +146,11 @@ def _to_tolerance(
         floor = 1e-15 * scale * sqrt(fine.steps)
         goal = max(rtol * scale, atol, floor)
         if estimate <= goal:
-            if not one and _RATIO * estimate <= goal:
-                return replace(coarse, error_estimate=max(_RATIO * estimate, floor)), larger
-            return replace(fine, error_estimate=max(estimate, floor)), local
+            if one:
+                return replace(fine, error_estimate=max(estimate, floor)), local
+            slack = min(max(goal / (_MARGIN * max(estimate, floor)), 1 / _MARGIN), _RATIO)
+            of_others = max(slack * local[0], _SMALLEST), max(slack * local[1], _SMALLEST)
+            return replace(fine, error_estimate=max(_MARGIN * slack * estimate, floor)), of_others
         if local[1] <= _SMALLEST:
             break
         needed = estimate / max(rtol * scale, atol)
@@ -155,7 +158,7 @@ def _to_tolerance(
             share /= min(needed / _RATIO, 1e4)
             local = max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST)
             fine = _once(system, X0, y0, times, *local, where)
-        coarse, larger, X, y = fine, local, fine.X[compared], fine.y[compared]
+        X, y = fine.X[compared], fine.y[compared]
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"

@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any
 
 from lie_codegen.door import warnings_given
-from lie_codegen.kernel.kernel import Body, Kernel, Port
+from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.runtime.records import find_record, store_record
 
@@ -39,12 +39,6 @@ def recorded_kernel(definition: Definition, make: Callable[[], Any]) -> Any:
         with contextlib.suppress(TypeError):
             store_record("kernel", definition.text, _record(made))
     return made
-
-
-def own_body(kernel: Kernel) -> Body:
-    """The body that its factory gave a kernel, whether it was made now or found in a record; what is found is made for it."""
-    later = getattr(kernel.body, "__self__", None)
-    return own_body(later.kernel) if isinstance(later, _Later) else kernel.body
 
 
 class _Later:
