@@ -33,13 +33,13 @@ typedef struct {
     const double *const *number;    /* inputs of the rate beside X, y and t */
     const ptrdiff_t *number_stride; /* in doubles from member to member */
     double t, t_low, h, rtol, atol, reach, longest; /* |Theta| stays within reach; h at most longest (the step to begin with, or 0) */
-    double *X, *y;                  /* members x packed, members x size */
+    double *X, *y;                  /* members x packed, members x size with room for the padding behind */
     const double *times;            /* that are wanted, all after t at the start */
     ptrdiff_t count, next, row;     /* of them; those that are done; members of all rows of the outputs */
     double *X_out, *y_out;          /* count x row x packed, count x row x size */
     double *knot_t, *knot_h, *knot_X, *knot_y; /* accepted steps, of one member; NULL if not wanted */
     ptrdiff_t room, knots;
-    double *work;                   /* members x (size x (STAGES + 4) + 2 packed + group) */
+    double *work;                   /* (STAGES + 4) vectors, each padded to whole eights, + members x (2 packed + group) */
     ptrdiff_t steps, rejected, evaluations;
 } Pair;
 
@@ -49,9 +49,15 @@ typedef struct {
     double *scratch, *aside, *theta;         /* elements twice, then Theta */
 } Room;
 
+/* Entries of y of all members, padded to whole eights: sums go eight at a time, and nobody reads what they make of the padding. */
+static ptrdiff_t wide(const Pair *p)
+{
+    return (p->members * p->size + 7) / 8 * 8;
+}
+
 static Room room_of(const Pair *p)
 {
-    const ptrdiff_t all = p->members * p->size, elements = p->members * p->packed;
+    const ptrdiff_t all = wide(p), elements = p->members * p->packed;
     Room room;
     room.k = p->work;
     room.stage = room.k + all * STAGES;
@@ -126,7 +132,7 @@ static int slope_of(const void *who, double t, const double *y, double *slope)
 static void advance(Pair *p, const double *X, const double *y, double t, double h, double *k, double *stage, double *after)
 {
     Within within = {p, X};
-    pair_step(slope_of, &within, p->members * p->size, t, y, h, k, stage, after);
+    pair_step(slope_of, &within, wide(p), t, y, h, k, stage, after);
 }
 
 /*
@@ -136,7 +142,7 @@ static double judged(const Pair *p, const double *y, const double *after, double
 {
     const Room room = room_of(p);
     double worst = 0.0;
-    pair_errors(k, p->members * p->size, room.more, room.last);
+    pair_errors(k, wide(p), room.more, room.last);
     for (ptrdiff_t m = 0; m < p->members; ++m) {
         double five = 0.0, three = 0.0, angle = 0.0;
         for (ptrdiff_t i = 0; i < p->size; ++i) {
@@ -188,6 +194,7 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
     double *k = room.k, *stage = room.stage, *after = room.after;
     int fresh = 0;
     p->knots = 0;
+    memset(k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
     rates(p, p->X, p->y, p->t, k);
     if (p->h <= 0.0) {
         p->h = first_step(p, p->y, k);
@@ -265,13 +272,18 @@ EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const d
 EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out)
 {
     const Room room = room_of(p);
+    double *y = room.more;
+    memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
+    memset(y, 0, (size_t)wide(p) * sizeof(double));
     for (ptrdiff_t c = 0; c < count; ++c) {
-        const double *X = p->knot_X + knot[c] * p->packed, *y = p->knot_y + knot[c] * p->size, t = p->knot_t[knot[c]];
-        double *to = X_out + c * p->packed, *after = y_out + c * p->size;
+        const double *X = p->knot_X + knot[c] * p->packed, t = p->knot_t[knot[c]];
+        double *to = X_out + c * p->packed;
         memcpy(to, X, (size_t)p->packed * sizeof(double));
+        memcpy(y, p->knot_y + knot[c] * p->size, (size_t)p->size * sizeof(double));
         rates(p, X, y, t, room.k);
-        advance(p, X, y, t, part[c] * p->knot_h[knot[c]], room.k, room.stage, after);
-        settle(p, to, after);
+        advance(p, X, y, t, part[c] * p->knot_h[knot[c]], room.k, room.stage, room.after);
+        settle(p, to, room.after);
+        memcpy(y_out + c * p->size, room.after, (size_t)p->size * sizeof(double));
     }
 }
 

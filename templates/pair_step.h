@@ -8,29 +8,27 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "ode_table.h" /* A, B, C, E3, E5 of twelve stages */
+#include "ode_table.h" /* A, B, C, E3, E5 of twelve stages; USED, USES: which entries of A and B are not 0, and how many */
 
 /* y' = slope(t, y); not 0 where it cannot be had. */
 typedef int (*Slope)(const void *who, double t, const double *y, double *slope);
 
 /*
- * Entries [first, first + WIDTH) of y + h sum_j a_j k_j, j < s, kept in registers: a sum over the stages in their order, so that the
- * bits depend neither on who calls nor on the width. Zero weights, half of them, are passed over.
+ * Entries [first, first + WIDTH) of y + h sum_j a_j k_j, kept in registers: a sum over the stages in their order, so that the bits depend
+ * neither on who calls nor on the width. `used` are the j with a_j other than 0, half of all.
  */
 #define PAIR_SUM(WIDTH)                                                                             \
-    static inline void pair_sum_##WIDTH(const double *a, int s, ptrdiff_t n, const double *k, const double *y, double h, double *to) \
+    static inline void pair_sum_##WIDTH(const double *a, const unsigned char *used, int count, ptrdiff_t n, const double *k, const double *y, double h, double *to) \
     {                                                                                               \
         double sum[WIDTH];                                                                          \
-        int j, l;                                                                                   \
+        int u, l;                                                                                   \
         for (l = 0; l < WIDTH; ++l) {                                                               \
             sum[l] = 0.0;                                                                           \
         }                                                                                           \
-        for (j = 0; j < s; ++j) {                                                                   \
-            if (a[j] != 0.0) {                                                                      \
-                const double *from = k + j * n;                                                     \
-                for (l = 0; l < WIDTH; ++l) {                                                       \
-                    sum[l] += a[j] * from[l];                                                       \
-                }                                                                                   \
+        for (u = 0; u < count; ++u) {                                                               \
+            const double weight = a[used[u]], *from = k + used[u] * n;                              \
+            for (l = 0; l < WIDTH; ++l) {                                                           \
+                sum[l] += weight * from[l];                                                         \
             }                                                                                       \
         }                                                                                           \
         for (l = 0; l < WIDTH; ++l) {                                                               \
@@ -51,21 +49,23 @@ static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const 
     int s;
     for (s = 1; s <= STAGES; ++s) {
         const double *a = s < STAGES ? A[s] : B;
+        const unsigned char *used = USED[s];
+        const int count = USES[s];
         double *to = s < STAGES ? stage : after;
         ptrdiff_t i = 0;
         for (; i + 8 <= n; i += 8) {
-            pair_sum_8(a, s, n, k + i, y + i, h, to + i);
+            pair_sum_8(a, used, count, n, k + i, y + i, h, to + i);
         }
         if (i + 4 <= n) {
-            pair_sum_4(a, s, n, k + i, y + i, h, to + i);
+            pair_sum_4(a, used, count, n, k + i, y + i, h, to + i);
             i += 4;
         }
         if (i + 2 <= n) {
-            pair_sum_2(a, s, n, k + i, y + i, h, to + i);
+            pair_sum_2(a, used, count, n, k + i, y + i, h, to + i);
             i += 2;
         }
         if (i < n) {
-            pair_sum_1(a, s, n, k + i, y + i, h, to + i);
+            pair_sum_1(a, used, count, n, k + i, y + i, h, to + i);
         }
         if (s < STAGES && slope(who, t + C[s] * h, stage, k + s * n)) {
             return 1;

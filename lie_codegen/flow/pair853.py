@@ -28,7 +28,7 @@ _PILOT, _MARGIN = 16, 4.0
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 16.0
 #: Times at which two runs of a single member are compared: those of the longer steps need not end at all that were asked for.
-_COMPARED = 16
+_COMPARED = 8
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
@@ -177,7 +177,7 @@ def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol:
     given, _kept = system.record(N)
     X_out, y_out = np.empty((k, N, packed)), np.empty((k, N, size))
     X_out[0], y_out[0] = X0, y0
-    # one block of memory: the state, the times behind the first, what a step works with
+    # one block of memory: the state, which is read in whole eights, the times behind the first, what a step works with
     state = N * (packed + size)
     block = np.empty(state + k - 1 + system.work_size(N))
     block[: N * packed], block[N * packed : state], block[state : state + k - 1] = X0.ravel(), y0.ravel(), times[1:]

@@ -55,7 +55,8 @@ class System:
 
     def work_size(self, members: int) -> int:
         """Doubles that a step of so many members works with, as templates/pair853.c lays them out."""
-        return members * (self.size * (STAGES + 4) + 2 * self.packed + self.group)
+        wide = -(-members * self.size // 8) * 8
+        return wide * (STAGES + 4) + members * (2 * self.packed + self.group)
 
     def work(self, members: int) -> Array:
         """Room for a step of so many members."""

@@ -25,6 +25,11 @@ def _step_table() -> str:
     rows = [f"enum {{ STAGES = {stages} }};", *_matrix("A", "STAGES", _filled(dop853.A, stages))]
     for name, values in (("B", dop853.B), ("C", dop853.C), ("E3", dop853.E3), ("E5", dop853.E5)):
         rows.append(f"static const double {name}[STAGES] = {{ {', '.join(map(repr, values))} }};")
+    # row s of A, then B: where it is not 0
+    sums = [[j for j in range(stages) if row.get(j, 0.0)] for row in (*dop853.A, dict(enumerate(dop853.B)))]
+    lists = ", ".join("{ " + ", ".join(map(str, used or [0])) + " }" for used in sums)
+    rows.append(f"static const unsigned char USED[STAGES + 1][STAGES] = {{ {lists} }};")
+    rows.append(f"static const int USES[STAGES + 1] = {{ {', '.join(str(len(used)) for used in sums)} }};")
     return "\n".join([*rows, ""])
 
 
