@@ -34,8 +34,13 @@ def loop_system(loop: Loop, library: Library, numbers: Mapping[str, Array]) -> S
 
 
 def _system(run: Run) -> System:
-    """That of a run which has one."""
-    assert run.system is not None, "asked of a loop without a rate"
+    """That of a run which has one.
+
+    Raises:
+        InputError: it has none.
+    """
+    if run.system is None:
+        raise InputError(f"closed_loop({run.loop.plant.namespace}): the loop has no smooth rate on groups")
     return run.system
 
 
@@ -60,9 +65,11 @@ def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
 def joined(loop: Loop, X: Array, y: Array) -> Array:
     """(..., m) states of (..., packed) elements and (..., size) vectors behind Theta."""
     elements, vectors = columns(loop)
+    behind = y[..., y.shape[-1] - len(vectors) :]
+    if not vectors or elements[-1] < vectors[0]:  # as they stand, unless elements of the law's own come after vectors
+        return np.concatenate([X, behind], axis=-1)
     states = np.empty((*X.shape[:-1], len(elements) + len(vectors)))
-    states[..., elements] = X
-    states[..., vectors] = y[..., y.shape[-1] - len(vectors) :]
+    states[..., elements], states[..., vectors] = X, behind
     return states
 
 

@@ -1,7 +1,7 @@
 """What `lc.closed_loop` knows before it is told a start: arguments read and checked, kernels, numbers. Kept for calls alike.
 
-A call is known by what it was told: arrays and numbers by their bytes, laws and groups by identity, which they are values enough
-for. What may differ another time though it looks the same, a Python function, a file, an object with a kernel, is read anew.
+A call is known by what it was told: arrays and numbers by their bytes, laws, references and groups by identity, which they are values
+enough for. What may differ another time though it looks the same, a Python function, a file, an object with a kernel, is read anew.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from lie_codegen.flow.pair_system import System
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.runtime.library import Library
+from lie_codegen.values import Value
 
 #: Bytes of an array, and entries of a sequence, up to which a call is worth knowing again: beyond, what they are for takes longer.
 _BYTES, _ENTRIES = 2**15, 64
@@ -120,7 +121,9 @@ def _known(value: Any) -> Hashable:
         return kind, *map(_known, value)
     if kind is dict and len(value) <= _ENTRIES and all(type(name) is str for name in value):
         return kind, *value, *map(_known, value.values())
-    if isinstance(value, MatrixGroup) or (isinstance(value, Kernel) and value.definition is not None):
+    if isinstance(value, MatrixGroup) or (
+        isinstance(value, Kernel | Value) and getattr(value, "definition", None) is not None
+    ):
         return kind, id(value)
     raise _UnknowableError
 
