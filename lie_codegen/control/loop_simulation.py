@@ -21,6 +21,7 @@ from lie_codegen.control.reference_check import check_once
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import Event
 from lie_codegen.identifiers import shown
+from lie_codegen.runtime.threads import check_threads
 
 
 def refuse(given: Mapping[str, Any], why: str) -> None:
@@ -72,6 +73,7 @@ def _run(
 ) -> Run:  # fmt: skip
     """The compiled loop with its numbers and its start."""
     told, model, library = loop.told, loop.loop, loop.library
+    check_threads(threads)
     if told.reference is not None:
         ends = float(told.times[0]), float(told.times[-1])
         if isinstance(told.reference, CurveReference):

@@ -35,6 +35,16 @@ def in_parts(work: Callable[[int, int], None], count: int, threads: Any, weight:
     share_out(work, count, threads, LEAST, weight)
 
 
+def check_threads(threads: Any) -> None:
+    """Refuse what is no number of threads.
+
+    Raises:
+        InputError: `threads` is no positive integer.
+    """
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise InputError(f"threads is an integer of at least 1, given {shown(threads)}")
+
+
 def share_out(work: Callable[[int, int], Part], count: int, threads: Any, least: int, weight: int = 0) -> list[Part]:
     """[work(start, stop), ...] for parts of range(count), in order, one a thread; no part is smaller than `least`.
 
@@ -43,8 +53,7 @@ def share_out(work: Callable[[int, int], Part], count: int, threads: Any, least:
     Raises:
         InputError: `threads` is no positive integer.
     """
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise InputError(f"threads is an integer of at least 1, given {shown(threads)}")
+    check_threads(threads)
     piece = max(8, CALLS // weight // 8 * 8) if weight > 0 else max(1, count)
     parts = min(threads, count // least)
     if parts < 2:
