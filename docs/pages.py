@@ -6,8 +6,6 @@ import ast
 import importlib
 import inspect
 import re
-import subprocess
-import sys
 from functools import cached_property
 from pathlib import Path
 
@@ -111,15 +109,13 @@ def errors() -> str:
 def command_line() -> str:
     """The help of every command."""
 
+    from typer.testing import CliRunner
+
+    from lie_codegen.cli.app import app
+
     def said(*words: str) -> str:
-        done = subprocess.run(
-            [sys.executable, "-m", "lie_codegen", *words, "--help"],
-            capture_output=True,
-            text=True,
-            check=True,
-            cwd=PACKAGE.parent,
-        )
-        return done.stdout.replace("python -m lie_codegen", "lie-codegen").strip()
+        done = CliRunner().invoke(app, [*words, "--help"], prog_name="lie-codegen", catch_exceptions=False)
+        return done.output.strip()
 
     whole = said()
     commands = re.findall(r"^  ([a-z][a-z_-]*)\s", whole.partition("Commands:")[2], flags=re.MULTILINE)

@@ -85,11 +85,10 @@ def _guarded(value: Any, name: str) -> Any:
         if home.get(name) is value:
             home[name] = guarded
         return guarded
-    if isinstance(value, type) and not issubclass(value, enum.Enum) and "__init__" in vars(value):
-        constructor = vars(value)["__init__"]
+    if isinstance(value, type) and not issubclass(value, enum.Enum):
+        constructor = getattr(value, "__init__")  # noqa: B009  its own or one that it inherits, which then becomes its own
         if isinstance(constructor, types.FunctionType) and not hasattr(constructor, "__guarded__"):
-            guarded = _guard(constructor, name, bound=True)
-            type.__setattr__(value, "__init__", guarded)
+            type.__setattr__(value, "__init__", _guard(constructor, name, bound=True))
     return value
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 NAMES = {"quantum": "gate", "underwater": "boat", "planar": "hover"}
-STRICT = ["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1", "-Iinclude"]
+# Not optimised: what gcc warns of then is asked of such packages by the tests of plans and of loops; here their programs run.
+STRICT = ["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O0", "-Iinclude"]
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
 

@@ -121,7 +121,7 @@ NO_NUMBER = ("NaN", "a list of NaN", "an array of NaN")
 #: Not for users: parts of packages, what the machine asks; a text and a path that would be read or written.
 LEFT_OUT = {
     "package_parts", "render_package", "made_by", "compiled_from", "belongs_to", "reduced", "of", "evaluate", "sampler", "sample", "defined_by",
-    "restored", "recorded", "machine", "start", "kernels", "averaged_kernel", "stacked", "variational", "quadrature", "slow_field",
+    "restored", "recorded", "machine", "start", "kernels", "averaged_kernel", "stacked", "result_type", "variational", "quadrature", "slow_field",
 }  # fmt: skip
 
 
@@ -171,6 +171,8 @@ def attempt(kind: str, name: str, method: Any, parameter: str, value: str, secon
     first = [given.pop(each) for each in known if known[each].kind is known[each].POSITIONAL_ONLY and each in given]
     answer: list[Any] = []
     verdict = hostile.judged(seconds, lambda: answer.append(method(*first, **given)))
+    if answer and value in hostile.NEVER_TAKEN:
+        return "masked entries were taken"
     if verdict is None and answer and value in NO_NUMBER and (kind, name) not in ANSWERED and _is_finite(answer[0]):
         return f"a finite answer: {answer[0]!r:.100}"
     return verdict
