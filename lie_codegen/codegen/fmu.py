@@ -7,7 +7,6 @@ import io
 import os
 import sys
 import sysconfig
-import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from lie_codegen.codegen.fmu_loop import loop_unit
 from lie_codegen.codegen.target_functions import (
     PortView,
     c_sources,
+    compile_folder,
     functions_of,
     put_files,
     run_compiler,
@@ -142,8 +142,7 @@ def packed_fmu(tree: Mapping[str, str], namespace: str, compilers: Sequence[Sequ
 
 
 def _library(sources: Mapping[str, str], headers: Mapping[str, str], compiler: Sequence[str]) -> bytes:
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with compile_folder() as folder:
         put_files(folder, {**sources, **{f"include/{each}": text for each, text in headers.items()}})
         library = folder / "library"
         maths = [] if os.name == "nt" else ["-lm"]

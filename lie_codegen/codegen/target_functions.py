@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import subprocess
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lie_codegen.errors import CompileError
+from lie_codegen.errors import CompileError, SystemRefusalError
 
 _RUST_WORDS = frozenset(
     "as break const continue crate dyn else enum extern false fn for if impl in let loop match mod move mut pub ref return self "
@@ -142,6 +144,22 @@ def c_sources(tree: Mapping[str, str]) -> list[str]:
 def crate_name(namespace: str) -> str:
     """The namespace as the registries of other languages take it."""
     return re.sub(r"_+", "_", namespace.lower()).strip("_")
+
+
+@contextlib.contextmanager
+def compile_folder() -> Iterator[Path]:
+    """A temporary folder to compile in, gone afterwards.
+
+    Raises:
+        SystemRefusalError: it, or a file in it, cannot be written.
+    """
+    try:
+        with tempfile.TemporaryDirectory() as name:
+            yield Path(name)
+    except OSError as error:
+        raise SystemRefusalError(
+            f"the temporary folder to compile in cannot be written: {error.strerror or error}"
+        ) from error
 
 
 def run_compiler(command: Sequence[str]) -> None:

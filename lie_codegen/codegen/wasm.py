@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import base64
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.target_functions import (
     c_sources,
+    compile_folder,
     crate_name,
     functions_of,
     put_files,
@@ -44,10 +43,9 @@ def wasm_binary(tree: Mapping[str, str], wrapper: str, exports: Sequence[str]) -
     """The C of a package and a wrapper as WebAssembly, by ziglang.
 
     Raises:
-        CompileError: the compiler's own words.
+        CompileError: the compiler's own words. SystemRefusalError: no temporary folder to compile in.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with compile_folder() as folder:
         put_files(
             folder, {**{path: tree[path] for path in tree if path.endswith((".c", ".h"))}, "src/space.c": wrapper}
         )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import base64
 import importlib.util
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.codegen.target_functions import compile_folder
 from lie_codegen.codegen.wasm import wasm_binary
 from lie_codegen.errors import InputError, MissingDependencyError
 from lie_codegen.flow.libraries import logarithms
@@ -59,8 +59,8 @@ def page_solver(plan: Any) -> dict[str, Any]:
         raise MissingDependencyError(
             "view: solve=True compiles with ziglang: install lie_codegen with its extra, lie_codegen[zig]"
         )
-    with tempfile.TemporaryDirectory() as folder:
-        package = generate(group, Path(folder) / "package", steering=plan.controls) / "steering"
+    with compile_folder() as folder:
+        package = generate(group, folder / "package", steering=plan.controls) / "steering"
         tree = {
             path.relative_to(package).as_posix(): path.read_text(encoding="utf-8") for path in package.rglob("*.[ch]")
         }
