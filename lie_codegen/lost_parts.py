@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Collection
 from typing import Any
 
 #: What holds neither: most arguments are of these classes, and are passed over.
 _WITHOUT_MASKS = frozenset({bool, int, float, complex, str, bytes, type(None)})
 
+_HOLDERS = (list, tuple, dict)
 
-def has_masks(values: Iterable[Any]) -> bool:
+
+def has_masks(values: Collection[Any]) -> bool:
     """Whether one of the values is an array of numpy.ma with masked entries, or a list, a tuple, a mapping or an array of objects (at any
     depth) that holds one.
 
     numpy drops the mask where numbers are asked for, and what lay below it counts.
     """
-    if "numpy.ma" in sys.modules:  # else nobody can have made one
-        for value in values:
-            if type(value) not in _WITHOUT_MASKS:
+    # Every call of the public interface comes by here; without numpy.ma nobody can have made one.
+    if "numpy.ma" not in sys.modules or _WITHOUT_MASKS.issuperset(map(type, values)):
+        return False
+    masked = sys.modules["numpy.ma"]
+    for value in values:
+        if isinstance(value, _HOLDERS):
+            if not _WITHOUT_MASKS.issuperset(map(type, value.values() if isinstance(value, dict) else value)):
                 return _holds_masks(list(values))
+        elif type(value) not in _WITHOUT_MASKS and (_holds_others(value) or isinstance(value, masked.MaskedArray)):
+            return _holds_masks(list(values))
     return False
 
 
@@ -39,7 +47,7 @@ def _holds_masks(left: list[Any]) -> bool:
 
 
 def _holds_others(value: Any) -> bool:
-    return isinstance(value, list | tuple | dict) or getattr(getattr(value, "dtype", None), "kind", "") == "O"
+    return isinstance(value, _HOLDERS) or getattr(getattr(value, "dtype", None), "kind", "") == "O"
 
 
 _entry: list[Any] = [None]
