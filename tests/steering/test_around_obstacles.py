@@ -201,7 +201,7 @@ def test_vectors_as_controls_and_a_drift_of_time_go_around_a_disc() -> None:
 def test_what_the_direct_method_has_not_among_obstacles_is_refused() -> None:
     se2 = lc.group("se2")
     given: dict[str, Any] = {"method": "direct", "obstacles": [lc.Ball((2.0, 0.0), 0.5)]}
-    for more in ({"equation": "right"}, {"pieces": 20}, {"objective": "time"}):
+    for more in ({"pieces": 20}, {"objective": "time"}):
         with pytest.raises(lc.errors.SteeringInputError, match="obstacles"):
             lc.steer(se2, (0, 4.0, 0), ("omega", "vx"), 4.0, **given, **more)
     with pytest.raises(lc.errors.SteeringError, match="target itself is inside obstacle 1"):

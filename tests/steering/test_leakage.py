@@ -92,8 +92,6 @@ def test_wrong_levels_and_gates_are_named() -> None:
             go(lc.UpToPhase(np.eye(2), levels=levels))
     with pytest.raises(lc.errors.ShapeError, match=r"\(2, 2\)"):
         go(lc.UpToPhase(np.eye(3), levels=(0, 1)))
-    with pytest.raises(lc.errors.SteeringInputError, match="direct"):
-        lc.steer("su3", lc.UpToPhase(np.eye(2), levels=(0, 1)), ("l1", "l4"), 5.0, method="ocp")
 
 
 def test_pictures_show_pulses_populations_and_bloch_vectors(tmp_path: Path) -> None:

@@ -44,14 +44,12 @@ def around(
     """The cheapest plan that stays clear of the obstacles; every class of ways that was found is in details["classes"].
 
     Raises:
-        SteeringInputError: a right-invariant system; of least time, no bounds, a system that depends on time or a coset.
+        SteeringInputError: of least time, no bounds, or a system that depends on time.
         InfeasibleError: proved, obstacles or not.
         SteeringError: an end inside an obstacle; nothing was found, which proves nothing.
     """
     began = time.perf_counter()
     where = f"steer({task.system.group.name})"
-    if task.system.right:
-        raise SteeringInputError(f'{where}: obstacles are looked at along X\' = X hat(u), equation="left"')
     keep_out = KeepOut.of(task.system.group.degree, obstacles)
     _refuse_blocked(task, keep_out, obstacles, where)
     proof = None if objective == "time" else certificate(task)
@@ -124,10 +122,10 @@ def _refuse_endless(task: Manoeuvre, where: str) -> None:
     """Of least time: controls without bounds have none, and what depends on time has no unit of it."""
     if not np.all(np.isfinite(task.low)) or not np.all(np.isfinite(task.high)):
         raise SteeringInputError(f'{where}: objective="time" among obstacles needs bounds on every control')
-    if not task.system.steady or any(task.free_slots):
+    if not task.system.steady:
         raise SteeringInputError(
-            f'{where}: objective="time" among obstacles by method="direct" needs controls and a drift that do not depend on time, and a goal '
-            'that is an element, a Pointing or a Position; method="transcription" takes a Coset'
+            f'{where}: objective="time" among obstacles stretches the time of the whole motion, which means nothing where controls or '
+            "drift are functions of the time; give constant ones, or steer in given durations"
         )
 
 

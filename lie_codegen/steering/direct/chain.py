@@ -14,14 +14,31 @@ from lie_codegen.steering.direct.programme import Goal, Programme
 def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array, Array]:
     """Residual r (L, q), reduced residual (L, n) and its derivative J (L, n, S m) at controls u (L, S, m)."""
     lanes, slots, m = u.shape
+    E, dE = factors(programme, u)
+    r, reduced, rows = by_factors(programme, goal, E, dE)
+    J = np.zeros((slots, lanes, rows.shape[1], m))
+    moving = np.moveaxis(rows, 2, 0)
+    for k, (slot, (p_k, q_k)) in enumerate(zip(programme.slot, programme.share, strict=True)):
+        J[slot] += p_k * moving[k]
+        if q_k != 0:
+            J[slot + 1] += q_k * moving[k]
+    return r, reduced, np.moveaxis(J, 0, 2).reshape(lanes, -1, slots * m)
+
+
+def factors(programme: Programme, u: Array) -> tuple[Array, Array]:
+    """The exponentials E (L, K, d, d) at controls u (L, S, m), and their derivatives (L, K, m, d, d) by what drives each."""
     p = programme
-    entry = np.broadcast_to(p.entry, (lanes, p.entry.shape[1]))
+    entry = np.broadcast_to(p.entry, (len(u), p.entry.shape[1]))
     b = p.directions[entry]
-    driven = p.share[:, :1] * u[:, p.slot] + p.share[:, 1:] * u[:, np.minimum(p.slot + 1, slots - 1)]
-    E, dE = exponentials(p.drifts[entry] + np.einsum("lki,lkixy->lkxy", driven, b), b)
+    driven = p.share[:, :1] * u[:, p.slot] + p.share[:, 1:] * u[:, np.minimum(p.slot + 1, u.shape[1] - 1)]
+    return exponentials(p.drifts[entry] + np.einsum("lki,lkixy->lkxy", driven, b), b)
+
+
+def by_factors(programme: Programme, goal: Goal, E: Array, dE: Array) -> tuple[Array, Array, Array]:
+    """Residual r (L, q), reduced residual (L, n) and how that changes with each of the factors, (L, n, K, m)."""
     K, d = E.shape[1], E.shape[-1]
     before, after = np.empty_like(E), np.empty_like(E)
-    X = np.broadcast_to(p.start, E[:, 0].shape).astype(E.dtype)
+    X = np.broadcast_to(programme.start, E[:, 0].shape).astype(E.dtype)
     for k in range(K):
         before[:, k] = X
         X = X @ E[:, k]
@@ -31,16 +48,10 @@ def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array,
         tail = E[:, k] @ tail
     # dX/du_k = E_1 .. E_k-1 (dE_k/du_k) E_k+1 .. E_K: with the products from both ends one matrix product a control
     moved = (goal.left @ before)[:, :, None] @ dE @ (after @ goal.right)[:, :, None]
-    r, reduce = residual(p.basis, goal, X)
+    r, reduce = residual(programme.basis, goal, X)
     moved = _following(goal, goal.left @ X @ goal.right, moved)[1]
     rows = np.einsum("lnq,lkiq->lnki", reduce, flat(moved))
-    J = np.zeros((slots, lanes, rows.shape[1], m))
-    moving = np.moveaxis(rows, 2, 0)
-    for k, (slot, (p_k, q_k)) in enumerate(zip(p.slot, p.share, strict=True)):
-        J[slot] += p_k * moving[k]
-        if q_k != 0:
-            J[slot + 1] += q_k * moving[k]
-    return r, np.einsum("lnq,lq->ln", reduce, r), np.moveaxis(J, 0, 2).reshape(lanes, -1, slots * m)
+    return r, np.einsum("lnq,lq->ln", reduce, r), rows
 
 
 def residual(basis: Array, goal: Goal, X: Array) -> tuple[Array, Array]:

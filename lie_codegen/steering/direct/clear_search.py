@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.steering.direct.chain import exponentials, flat, linearise, residual
+from lie_codegen.steering.direct.chain import by_factors, exponentials, factors, flat, residual
 from lie_codegen.steering.direct.numpy_search import Box, Lanes, Rows, reach
 from lie_codegen.steering.direct.programme import Goal, Programme, Settings
 from lie_codegen.steering.obstacles.keep_out import KeepOut
@@ -55,6 +55,7 @@ class Course:
         nodes: (k,) numbers of own exponentials after which the obstacles are looked at.
         margins: (o,) gaps that must be kept.
         longest: the duration is the last control of each lane, up to that many times the given one; zero where it is given.
+        right: whether the system is right-invariant: its chain is that of the left-invariant one in reversed time.
     """
 
     programme: Programme
@@ -65,6 +66,7 @@ class Course:
     nodes: Rows
     margins: Array
     longest: float = 0.0
+    right: bool = False
 
     @property
     def box(self) -> Box:
@@ -83,34 +85,50 @@ class Course:
             return u.reshape(lanes, *shape), np.ones(lanes)
         return u[:, :-1].reshape(lanes, *shape), u[:, -1]
 
-    def states(self, u: Array) -> tuple[Array, Array]:
-        """States (L, K + 1, d, d) along the way, and the matrices eta (L, K, m, d, d) by which u_ki moves all later ones: exp(eta) X.
-
-        Of least time the last of the m + 1 matrices belong to the duration, which moves the states after each exponential.
-        """
+    def factors(self, u: Array) -> tuple[Array, Array]:
+        """The system's own exponentials E (L, K, d, d) in the order of the chain, and their derivatives (L, K, m, d, d) by what drives
+        each; of least time the last of m + 1 belong to the duration."""
         p = self.programme
-        lanes = len(u)
         controls, lasting = self.split(u)
-        own = slice(self.first, self.first + len(self.own_slots))
-        entry = p.entry[0, own]
-        slot, share = p.slot[own], p.share[own]
+        own = self.own
+        entry, slot, share = p.entry[0, own], p.slot[own], p.share[own]
         b = p.directions[entry]
         after = np.minimum(slot + 1, controls.shape[1] - 1)
         driven = share[:, :1] * controls[:, slot] + share[:, 1:] * controls[:, after]
         velocity = p.drifts[entry] + np.einsum("lki,kixy->lkxy", driven, b)
-        slopes = np.broadcast_to(b, (lanes, *b.shape))
+        slopes = np.broadcast_to(b, (len(u), *b.shape))
         if self.longest:
             by = lasting[:, None, None, None]
             slopes = np.concatenate([by[..., None] * slopes, velocity[:, :, None]], axis=2)
             velocity = by * velocity
-        E, dE = exponentials(velocity, slopes)
-        X = np.empty((lanes, len(entry) + 1, *self.start.shape), E.dtype)
+        return exponentials(velocity, slopes)
+
+    def states(self, u: Array) -> tuple[Array, Array]:
+        """States X (L, K + 1, d, d) along the way, and the matrices eta (L, K, m, d, d) by which what drives the k-th step moves all
+        later ones: to exp(eta) X, of a right-invariant system to X exp(eta).
+
+        Of least time the last of the m + 1 matrices belong to the duration, which moves the states after each exponential.
+        """
+        return self._stepped(*self.factors(u))
+
+    def _stepped(self, E: Array, dE: Array) -> tuple[Array, Array]:
+        if self.right:
+            E, dE = E[:, ::-1], dE[:, ::-1]
+        X = np.empty((len(E), E.shape[1] + 1, *self.start.shape), E.dtype)
         X[:, 0] = self.start
-        for k in range(len(entry)):
-            X[:, k + 1] = X[:, k] @ E[:, k]
-        # X_k+1 = X_k E_k moves by X_k dE_k = (X_k dE_k X_k+1^-1) X_k+1, and what follows from it by the same factor on the left
+        for k in range(E.shape[1]):
+            X[:, k + 1] = E[:, k] @ X[:, k] if self.right else X[:, k] @ E[:, k]
         back = np.linalg.inv(X[:, 1:])
+        # X_k+1 = X_k E_k moves by X_k dE_k = (X_k dE_k X_k+1^-1) X_k+1, and what follows from it by the same factor on the left;
+        # X_k+1 = E_k X_k by X_k+1 (X_k+1^-1 dE_k X_k), and what follows by the same factor on the right
+        if self.right:
+            return X, back[:, :, None] @ dE @ X[:, :-1, None]
         return X, X[:, :-1, None] @ dE @ back[:, :, None]
+
+    @property
+    def own(self) -> slice:
+        """The system's own exponentials among all of the chain."""
+        return slice(self.first, self.first + int(self.nodes[-1]) + 1)
 
     @property
     def free(self) -> bool:
@@ -120,13 +138,17 @@ class Course:
     @property
     def own_slots(self) -> Rows:
         """The slot of each of the system's own exponentials."""
-        p = self.programme
-        return p.slot[self.first : self.first + self.nodes[-1] + 1]
+        return self.programme.slot[self.own]
 
     def _gaps(self, X: Array, eta: Array) -> tuple[Array, Array]:
         """Gaps less margins (L, R) of the nearest obstacles at the nodes, and their derivatives (L, R, C)."""
         lanes, count, m = eta.shape[:3]
-        gap, N = self.keep_out.nearest(np.real(X[:, 1 + self.nodes]), self.margins, _NEAREST)
+        here = np.real(X[:, 1 + self.nodes])
+        gap, N = self.keep_out.nearest(here, self.margins, _NEAREST)
+        if self.right:
+            # X exp(eta) is exp(X eta X^-1) X: <N, X eta X^-1> = <X' N X^-T, eta>
+            turned = np.swapaxes(here, -1, -2)[:, :, None]
+            N = turned @ N @ np.linalg.inv(turned)
         few = gap.shape[2]
         d2 = N.shape[-1] ** 2
         A = N.reshape(lanes, -1, d2) @ np.swapaxes(np.real(eta).reshape(lanes, count * m, d2), 1, 2)
@@ -135,28 +157,44 @@ class Course:
         rows = self.by_slots(A.reshape(lanes, -1, count, m))
         return gap.reshape(lanes, -1), rows
 
+    def columns_moved(self, X: Array, eta: Array, axes: Array) -> Array:
+        """(L, nodes, a, K, m, d): how the columns X e of the nodes change, e the rows of axes (a, d); eta as `states` has them."""
+        here, steps = np.real(X[:, 1 + self.nodes]), np.real(eta)
+        if self.right:
+            moved = np.einsum("lkxz,ljmzy,ay->lkajmx", here, steps, axes, optimize=True)
+        else:
+            moved = np.einsum("ljmxy,lkyz,az->lkajmx", steps, here, axes, optimize=True)
+        earlier = np.arange(eta.shape[1]) <= self.nodes[:, None]
+        return np.asarray(moved * earlier[None, :, None, :, None, None])
+
     def by_slots(self, rows: Array) -> Array:
-        """Derivatives (L, R, K, m) by what drives each own exponential as those by the controls, (L, R, C)."""
+        """Derivatives (L, R, K, m) by what drives each own step as those by the controls, (L, R, C)."""
+        return self._spread(rows[:, :, ::-1] if self.right else rows, self.own)
+
+    def _spread(self, rows: Array, some: slice) -> Array:
+        """Derivatives (L, R, K, m) by what drives some exponentials of the chain as those by the controls, (L, R, C)."""
         p, count = self.programme, rows.shape[2]
-        own = slice(self.first, self.first + count)
         if self.longest:
             rows, lasting = rows[..., :-1], np.sum(rows[..., -1], axis=2)
         by_slot = np.zeros((count, p.low.shape[0]))
-        by_slot[np.arange(count), p.slot[own]] += p.share[own, 0]
-        ahead = np.minimum(p.slot[own] + 1, p.low.shape[0] - 1)
-        by_slot[np.arange(count), ahead] += p.share[own, 1]
+        by_slot[np.arange(count), p.slot[some]] += p.share[some, 0]
+        ahead = np.minimum(p.slot[some] + 1, p.low.shape[0] - 1)
+        by_slot[np.arange(count), ahead] += p.share[some, 1]
         found = np.einsum("lrkm,ks->lrsm", rows, by_slot, optimize=True)
         found = found.reshape(*found.shape[:2], -1)
         return np.asarray(np.concatenate([found, lasting[..., None]], axis=2) if self.longest else found)
 
     def known(self, u: Array) -> Known:
         """What a step needs at controls u (L, C)."""
-        lanes = len(u)
-        X, eta = self.states(u)
+        E, dE = self.factors(u)
+        X, eta = self._stepped(E, dE)
         gap, A = self._gaps(X, eta)
-        goal = replace(self.goal, value=np.repeat(self.goal.value, lanes, axis=0))
-        if self.free:
-            full, r, J = linearise(self.programme, goal, self.split(u)[0])
+        goal = replace(self.goal, value=np.repeat(self.goal.value, len(u), axis=0))
+        if self.free or self.right:
+            # free motions have exponentials of their own on either side, which no duration stretches; a right-invariant system's chain
+            # ends at X X(0)^-1
+            full, r, rows = by_factors(self.programme, goal, *self._whole(u, E, dE))
+            J = self._spread(rows, slice(None))
         else:
             full, reduce = residual(self.programme.basis, goal, X[:, -1])
             moved = goal.left @ eta @ (X[:, -1] @ goal.right)[:, None, None]
@@ -164,6 +202,23 @@ class Course:
             r = np.einsum("lnq,lq->ln", reduce, full)
         size = np.sqrt(np.sum(full**2, axis=1) + np.sum(np.minimum(gap, 0.0) ** 2, axis=1))
         return Known(np.where(np.isfinite(size), size, np.inf), *(np.nan_to_num(each) for each in (r, J, gap, A)))
+
+    def _whole(self, u: Array, E: Array, dE: Array) -> tuple[Array, Array]:
+        """All exponentials of the chain, of which the system's own are known; the duration does not move the others."""
+        p, own = self.programme, self.own
+        rows = np.concatenate([np.arange(own.start), np.arange(own.stop, len(p.slot))])
+        if not len(rows):
+            return E, dE
+        others = replace(p, entry=p.entry[:, rows], slot=p.slot[rows], share=p.share[rows])
+        F, dF = factors(others, self.split(u)[0])
+        if self.longest:
+            dF = np.concatenate([dF, np.zeros_like(dF[:, :, :1])], axis=2)
+        F, dF = F.astype(E.dtype), dF.astype(E.dtype)
+        first = own.start
+        return (
+            np.concatenate([F[:, :first], E, F[:, first:]], axis=1),
+            np.concatenate([dF[:, :first], dE, dF[:, first:]], axis=1),
+        )
 
     def jumps(self, u: Array) -> Array:
         """(L,) whether a lane (L, C) goes through an obstacle in one step, clear before and behind it: past the middle of the thinnest

@@ -156,7 +156,8 @@ class Scene:
         thin = np.maximum(0.0, _APART * self.travel / len(nodes) - self.keep_out.sizes) * self.keep_out.placed
         given = thin if margins is None else np.maximum(thin, margins)
         goal = task.goal(np.array([variant]))
-        return Course(programme, goal, self.keep_out, task.system.start, first, nodes, given, self.longest)
+        system = task.system
+        return Course(programme, goal, self.keep_out, system.start, first, nodes, given, self.longest, system.right)
 
     def following(self, course: Course, way: Places, u: Array) -> Array:
         """Controls (L, C) that end at the goal, as near to the way as they can."""
@@ -173,10 +174,8 @@ class Scene:
             X, eta = course.states(u)
             o = np.einsum("lkij,aj->lkai", np.real(X[:, 1 + course.nodes]), axes)
             off = (o - along) * weight[:, None]
-            lanes, count, m = eta.shape[:3]
-            before = (np.arange(count) <= course.nodes[:, None]).astype(float)
-            moved = np.einsum("ljmxy,lkay->lkajmx", np.real(eta), o * weight[:, None], optimize=True)
-            moved *= before[None, :, None, :, None, None]
+            moved = course.columns_moved(X, eta, axes) * weight[:, None, None, None]
+            lanes, _, _, count, m, _ = moved.shape
             rows = np.moveaxis(moved, 5, 3).reshape(lanes, -1, count, m)
             J2 = course.by_slots(rows)
             flat = off.reshape(lanes, -1)

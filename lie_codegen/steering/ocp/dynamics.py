@@ -22,7 +22,7 @@ def dynamics_of(
     group: MatrixGroup,
     where: str,
     dynamics: str,
-    controls: Sequence[str | int] | None,
+    controls: Sequence[Any] | None,
     inputs: Mapping[str, Any] | None,
     states: Mapping[str, Any] | None,
     velocity: Terms | None,
@@ -71,7 +71,7 @@ def dynamics_of(
 def _columns(
     group: MatrixGroup,
     where: str,
-    controls: Sequence[str | int] | None,
+    controls: Sequence[Any] | None,
     inputs: Mapping[str, Any] | None,
     allocation: ArrayLike | None,
 ) -> Array:
@@ -90,10 +90,17 @@ def _columns(
     if inputs is not None:
         raise InputError(f"{where}: controls= names its input u itself; give inputs= with velocity= or allocation=")
     chosen = [controls] if isinstance(controls, str | int) else list(controls)
-    places = [group.algebra.index(each) for each in chosen]
-    if len(set(places)) != len(places) or not places:
+    places = [group.algebra.index(each) for each in chosen if isinstance(each, str) or np.ndim(each) == 0]
+    if len(set(places)) != len(places) or not chosen:
         raise InputError(f"{where}: controls {chosen} are none or repeat one")
-    return np.eye(group.dim)[:, places]
+    eye = np.eye(group.dim)
+    rows = [
+        eye[group.algebra.index(each)]
+        if isinstance(each, str) or np.ndim(each) == 0
+        else _array(each, (group.dim,), "a control", where)
+        for each in chosen
+    ]
+    return np.array(rows).T
 
 
 def _listed(names: Any) -> str:

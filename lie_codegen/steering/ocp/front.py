@@ -30,7 +30,7 @@ def ocp(
     *,
     duration: float | tuple[float, float],
     intervals: int,
-    controls: Sequence[str | int] | None = None,
+    controls: Sequence[Any] | None = None,
     inputs: Mapping[str, Any] | None = None,
     states: Mapping[str, Any] | None = None,
     velocity: Terms | None = None,
@@ -65,7 +65,7 @@ def ocp(
         group: the group, or its name.
         duration: seconds; or a pair (shortest, longest): then it is found too, a number T that formulas may use.
         intervals: N.
-        controls: labels (or positions) of the actuated basis elements: xi = sum_i u_i A_i + drift; with
+        controls: labels (or positions) of the actuated basis elements, or (n,) vectors: xi = sum_i u_i b_i + drift; with
             dynamics="second_order" the body forces that the controls are. The input is called u.
         inputs: names and shapes of inputs of one's own, with `velocity` (first order) or `allocation` (second order).
         states: names and shapes of states beside X.

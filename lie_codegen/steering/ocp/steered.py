@@ -13,18 +13,17 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import LieCodegenError, SteeringError, SteeringInputError
-from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
-from lie_codegen.steering.direct.system import velocity
-from lie_codegen.steering.goals import Coset, Pointing, Position, UpToPhase, cosets
+from lie_codegen.steering.direct.report import leakage
+from lie_codegen.steering.direct.system import controls_of, velocity
+from lie_codegen.steering.goals import GoalSet, UpToPhase, cosets, end_of
+from lie_codegen.steering.ocp.goal_terms import GOAL, away, goal_terms
 from lie_codegen.steering.ocp.problem_data import Affine
 from lie_codegen.steering.ocp.stage_controls import StageControls
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status
 
 if TYPE_CHECKING:
     from lie_codegen.steering.ocp.problem import OptimalControlProblem
-
-_GOAL = "steer_goal"
 
 
 def open_plan(
@@ -51,9 +50,9 @@ def open_plan(
     """The cheapest of several starts of a problem of one's own from the identity (or `start`) to the target.
 
     Args:
-        group, target, controls, duration, tolerance: as `lc.steer`; a pair of durations is searched between. Goals are
-            elements, `Pointing`, `Position`, `UpToPhase`, and a `Coset` of a real group whose free motions are all that keep some
-            vectors where they are (turns about an axis).
+        group, target, controls, duration, tolerance: as `lc.steer`; a pair of durations is searched between. Controls are labels,
+            positions or (n,) vectors; goals are elements and all sets of goals whose free motions linear equations in the entries of X
+            tell from others (turns about an axis, gates on some levels).
         cost: l of `lc.ocp`, in X, u, t and the parameters; norm2(u) if not given, so that the cost is int |u|^2 dt.
         terminal_cost, constraints: phi and g of `lc.ocp`.
         parameters: {name: value} of the formulas.
@@ -67,7 +66,7 @@ def open_plan(
         Others as `lc.ocp` and `solve`.
     """
     group = require_group(group, "steer")
-    if isinstance(target, UpToPhase):
+    if isinstance(target, UpToPhase) and len(end_of(group, target, f"steer({group.name}): target").phases) > 1:
         asked = {
             "cost": cost, "terminal_cost": terminal_cost, "constraints": constraints, "parameters": parameters, "bounds": bounds,
             "drift": drift, "start": start, "intervals": intervals, "starts": starts, "seed": seed, "guess": guess,
@@ -75,18 +74,33 @@ def open_plan(
         }  # fmt: skip
         return _cheapest_phase(group, target, controls, duration, tolerance, asked)
     own = {name: np.asarray(value) for name, value in dict(parameters or {}).items()}
-    terminal, goal, values = _goal(group, target, own)
-    shapes = tuple((name, "X" if name == _GOAL else value.shape) for name, value in values.items())
+    goal = goal_terms(group, target, f"steer({group.name}): target")
+    taken = sorted(set(own) & set(goal.values))
+    if taken:
+        raise SteeringInputError(
+            f"steer({group.name}): the parameter {taken[0]} has a name of the goal's own; choose another"
+        )
+    values: dict[str, Any] = {**own, **goal.values}
+    labels, directions = controls_of(group, controls, f"steer({group.name})")
+    moving = [label for label, each in zip(labels, directions, strict=True) if each.constant is None]
+    if moving:
+        raise SteeringInputError(
+            f"steer({group.name}): the control {moving[0]} is a function of the time; with costs or constraints of one's own controls are "
+            'labels or (n,) vectors: write such a velocity in lc.ocp(inputs=, velocity=), or take method="direct"'
+        )
+    shapes = tuple((name, "X" if name == GOAL else value.shape) for name, value in values.items())
     frozen = [_frozen(each) for each in (cost, terminal_cost, constraints, bounds, drift, duration)]
     began = time.perf_counter()
     problem = _problem(
-        group, tuple(controls), *frozen, terminal=terminal, shapes=shapes, intervals=intervals,
+        group, tuple(_frozen(each) for each in controls), *frozen, labels=labels, terminal=goal.terminal, shapes=shapes, intervals=intervals,
         quadrature=quadrature, integrator=integrator,
     )  # fmt: skip
     first = np.eye(group.degree) if start is None else start
     found = problem.solve(first, guess=guess, starts=starts, seed=seed, **values)
     steered = (
-        None if guess is not None or goal is None or start is not None else _extremal(problem, goal, found.duration)
+        None
+        if guess is not None or len(goal.free) or start is not None
+        else _extremal(problem, goal.element, found.duration)
     )
     if steered is not None:
         other = problem.solve(first, guess=steered, **values)
@@ -100,27 +114,29 @@ def open_plan(
             f"{what} at interval {stage} of {intervals} missed by {found.violation:.3g}; more starts, "
             f"another seed or a guess may find one, wider bounds may make it possible"
         )
+    error = max(found.error, away(group, goal, found.X_final))
     law = problem.data.velocity
     columns = np.array(law.columns) if isinstance(law, Affine) else np.eye(group.dim)
     velocities = StageControls(np.asarray(found.u) @ columns.T, found.duration)
     return Plan(
         group=group,
-        target=found.X_final if goal is None else goal,
-        controls=tuple(group.labels[group.algebra.index(each)] for each in controls),
+        target=found.X_final if len(goal.free) else goal.element,
+        controls=labels,
         duration=found.duration,
         method="ocp",
         u=Controls(velocities, found.t),
         cost=found.cost,
         outcome=Facts(
             found.X_final,
-            found.error,
-            Status.LOCAL if found.error <= tolerance else Status.NOT_CONVERGED,
+            error,
+            Status.LOCAL if error <= tolerance else Status.NOT_CONVERGED,
             {
                 "plan": found,
                 "problem": problem,
                 "inputs": StageControls(found.u, found.duration),
                 **({} if start is None else {"start": np.asarray(found.X[0])}),
                 **_constant_drift(group, drift),
+                **_told(target, found.X_final),
             },
             {"solve": time.perf_counter() - began},
         ),
@@ -135,6 +151,19 @@ def _constant_drift(group: MatrixGroup, drift: Any) -> dict[str, Array]:
     return {} if constant is None else {"drift": constant}
 
 
+def _told(target: Any, X: Array) -> dict[str, Any]:
+    """The goal as a fact of the plan, where it is a set; of a gate on some levels, or up to any phase, how good it is."""
+    if not isinstance(target, GoalSet):
+        return {}
+    if not isinstance(target, UpToPhase):
+        return {"goal": target}
+    levels = tuple(range(len(X))) if target.levels is None else tuple(target.levels)
+    block = X[np.ix_(levels, levels)]
+    overlap = np.abs(np.vdot(np.asarray(target.gate), block)) ** 2 / len(levels) ** 2
+    known = {"goal": target, "fidelity": float(overlap)}
+    return known if target.levels is None else {**known, "leakage": leakage(X, levels)}
+
+
 def _cheapest_phase(
     group: MatrixGroup,
     target: UpToPhase,
@@ -146,15 +175,9 @@ def _cheapest_phase(
     """The cheapest of the plans to each of the phases of a gate that the group has.
 
     Raises:
-        SteeringInputError: any phase will do, as on U(d).
         SteeringError: no phase is reached.
     """
-    elements, free = cosets(group, target, f"steer({group.name}): target")
-    if len(free):
-        raise SteeringInputError(
-            f"steer({group.name}): with costs or constraints of one's own the gate must be up to one of finitely many phases: give it "
-            'with its phase, on all levels; method="direct" takes any'
-        )
+    elements, _ = cosets(group, target, f"steer({group.name}): target")
     plans: list[Plan] = []
     failed: list[SteeringError] = []
     for element in elements:
@@ -166,55 +189,6 @@ def _cheapest_phase(
         raise failed[0]
     best = min(plans, key=lambda plan: plan.cost)
     return replace(best, outcome=replace(best.facts, details={**best.details, "goal": target}))
-
-
-def _kept_columns(group: MatrixGroup, target: Coset) -> tuple[Array, Array]:
-    """Columns V (d, k) and T V so that X is in the coset exactly where X V = T V.
-
-    Raises:
-        SteeringInputError: other motions than the free ones keep the vectors that those keep, or the group is complex.
-    """
-    where = f"steer({group.name}): target"
-    elements, free = cosets(group, target, where)
-    if not group.is_complex:
-        _, sizes, across = np.linalg.svd(group.hat(free).reshape(-1, group.degree))
-        V = across[int(np.sum(sizes > 1e-10)) :].T
-        slopes = (group.basis @ V).reshape(group.dim, -1)
-        if group.dim - np.linalg.matrix_rank(slopes, tol=1e-10) == np.linalg.matrix_rank(free, tol=1e-10):
-            return V, elements[0] @ V
-    raise SteeringInputError(
-        f"{where}: with costs or constraints of one's own a Coset must be that of all motions that keep some vectors where they are, "
-        'as turns about an axis do, in a real group; method="direct" and "transcription" take any'
-    )
-
-
-def _goal(
-    group: MatrixGroup, target: Any, values: dict[str, Any]
-) -> tuple[tuple[str, ...], Array | None, dict[str, Any]]:
-    """The terminal texts, the element if the goal is one, and the parameters with those of the goal."""
-    d = group.degree
-    if isinstance(target, Pointing) and not group.is_complex:
-        axis, direction = np.zeros(d), np.zeros(d)
-        given = np.asarray(target.direction, dtype=float)
-        axis[: len(given)], direction[: len(given)] = np.asarray(target.axis), given / np.linalg.norm(given)
-        axis = axis / np.linalg.norm(axis)
-        return ("X*goal_axis - goal_direction",), None, {**values, "goal_axis": axis, "goal_direction": direction}
-    if isinstance(target, Position) and not group.is_complex:
-        point = np.ones(d)
-        point[: d - 1] = np.asarray(target.point, dtype=float)
-        return ("X*goal_column - goal_point",), None, {**values, "goal_column": np.eye(d)[-1], "goal_point": point}
-    if isinstance(target, Coset):
-        V, ends = _kept_columns(group, target)
-        pairs = zip(V.T, ends.T, strict=True)
-        fixed = {f"goal_{kind}{k}": each for k, pair in enumerate(pairs) for kind, each in zip("ve", pair, strict=True)}
-        return tuple(f"X*goal_v{k} - goal_e{k}" for k in range(V.shape[1])), None, {**values, **fixed}
-    if isinstance(target, Pointing | Position) or not isinstance(target, np.ndarray | list | tuple):
-        raise SteeringInputError(
-            f"steer({group.name}): with costs or constraints of one's own the goal is an element, a Pointing, a Position or a Coset "
-            f"of a real group, or UpToPhase; got {type(target).__name__}"
-        )
-    element = group_element(group, target, f"steer({group.name}): target")
-    return (f"X - {_GOAL}",), element, {**values, _GOAL: element}
 
 
 def _frozen(value: Any) -> Any:
@@ -251,6 +225,7 @@ def _problem(
     drift: Any,
     duration: Any,
     *,
+    labels: tuple[str, ...],
     terminal: tuple[str, ...],
     shapes: tuple[tuple[str, Any], ...],
     intervals: int,
@@ -260,12 +235,12 @@ def _problem(
     """The problem, made once for equal arguments: another target or another value of a parameter builds nothing."""
     limits = _thawed(bounds)
     if isinstance(limits, Mapping):
-        limits = _by_label(group, controls, limits)
+        limits = _by_label(group, labels, limits)
     from lie_codegen.steering.ocp.front import ocp  # and with it CasADi, which steering by shooting does without
 
     return ocp(
         group,
-        controls=controls,
+        controls=_thawed(("sequence", *controls)),
         duration=_thawed(duration),
         intervals=intervals,
         stage_cost="norm2(u)" if cost is None else _thawed(cost),
@@ -281,14 +256,13 @@ def _problem(
     )
 
 
-def _by_label(group: MatrixGroup, controls: tuple[Any, ...], limits: Mapping[Any, Any]) -> Any:
+def _by_label(group: MatrixGroup, labels: tuple[str, ...], limits: Mapping[Any, Any]) -> Any:
     """Bounds by label, as lc.steer has them, as arrays in the order of the controls."""
     if set(limits) == {"u"}:
         return limits
-    labels = [group.labels[group.algebra.index(each)] for each in controls]
     low, high = np.full(len(labels), -np.inf), np.full(len(labels), np.inf)
     for label, limit in limits.items():
-        name = group.labels[group.algebra.index(label)]
+        name = label if label in labels else group.labels[group.algebra.index(label)]
         if name not in labels:
             raise SteeringInputError(f"steer({group.name}): bounds of {label!r}, which is no control")
         pair = limit if isinstance(limit, tuple | list) else (-limit, limit)
@@ -304,7 +278,10 @@ def _extremal(problem: OptimalControlProblem, goal: Array, duration: float) -> P
     law = problem.data.velocity
     if not isinstance(law, Affine) or any(law.drift):
         return None
-    controls = [int(np.flatnonzero(column)[0]) for column in np.array(law.columns).T]
+    columns = np.array(law.columns).T
+    if np.any(np.sum(columns != 0, axis=1) != 1) or np.any(np.sum(columns, axis=1) != 1):
+        return None  # shooting has basis elements alone
+    controls = [int(np.flatnonzero(column)[0]) for column in columns]
     try:
         return optimal(make_task(problem.data.group, goal, controls, duration, 1e-6))
     except LieCodegenError:
