@@ -57,7 +57,13 @@ def asks_direct(method: str, target: Any, controls: Sequence[Any], options: Mapp
 def goes_around(method: str, controls: Sequence[Any], options: Mapping[str, Any]) -> bool:
     """Whether "auto" may ask the direct method where the transcription found no way among obstacles."""
     given = {name for name, value in options.items() if value is not None}
-    return method == "auto" and _avoids(options) and _only_direct(given) and _plain(controls)
+    if method != "auto" or not _avoids(options) or not _plain(controls):
+        return False
+    if options.get("dynamics") == "second_order":
+        from lie_codegen.steering.direct.front import torque_options
+
+        return given <= torque_options()
+    return _only_direct(given)
 
 
 def _avoids(options: Mapping[str, Any]) -> bool:

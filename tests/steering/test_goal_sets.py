@@ -149,11 +149,9 @@ def test_the_open_layer_ends_in_a_coset_as_the_direct_method_does(side: str) -> 
     np.testing.assert_allclose(turn[:, 0], [1, 0, 0], atol=1e-7)
 
 
-def test_the_open_layer_takes_a_gate_up_to_its_phase_and_refuses_what_it_cannot_say() -> None:
+def test_the_open_layer_takes_a_gate_up_to_its_phase() -> None:
     su2 = lc.group("su2")
     gate = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
     plan = lc.steer(su2, lc.UpToPhase(gate), ("sx", "sy"), 1.0, method="ocp")
     assert plan.cost == pytest.approx(15.507140, rel=1e-3)
     assert abs(np.vdot(gate, plan.X_final)) / 2 == pytest.approx(1, abs=1e-9)
-    with pytest.raises(lc.errors.SteeringInputError, match="Coset"):
-        lc.steer(su2, lc.Coset(np.eye(2), free=("sz",)), ("sx", "sy"), 1.0, method="ocp")

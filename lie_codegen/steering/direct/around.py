@@ -20,10 +20,13 @@ from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.programme import Settings
-from lie_codegen.steering.direct.report import plan_of
 from lie_codegen.steering.direct.scene import CLEAR, ENOUGH, STRAIGHT, Result, Scene
+from lie_codegen.steering.direct.sharper import sharper
 from lie_codegen.steering.obstacles.keep_out import KeepOut
 from lie_codegen.steering.plan import Plan, Status
+
+#: Results that are sharpened, the cheapest first, and relative costs that are taken for one.
+_SHARPENED, _ALIKE = 3, 1e-2
 
 
 def around(
@@ -51,21 +54,43 @@ def around(
     began = time.perf_counter()
     where = f"steer({task.system.group.name})"
     keep_out = KeepOut.of(task.system.group.degree, obstacles)
-    _refuse_blocked(task, keep_out, obstacles, where)
+    refuse_blocked(task, keep_out, obstacles, where)
     proof = None if objective == "time" else certificate(task)
     if proof is not None:
         raise InfeasibleError(f"{where}: infeasible even without obstacles: {proof}", certificate=proof)
     timed = objective == "time"
     if timed:
         _refuse_endless(task, where)
-    settings = Settings(
-        objective in ("fuel", "time"),
-        iterations,
-        0 if objective == "none" else iterations,
-        enough=ENOUGH,
-        relative=1e-6,
-    )
+    settings = scene_settings(objective, iterations)
     scene = Scene(task, keep_out, tuple(obstacles), settings, objective, longest if timed else 0.0)
+    return searched_scene(scene, target, classes, tolerance, starts, rounds, seed, guesses, say, began)
+
+
+def scene_settings(objective: str, iterations: int) -> Settings:
+    """How far a start descends among obstacles."""
+    descend = 0 if objective == "none" else iterations
+    return Settings(objective in ("fuel", "time"), iterations, descend, enough=ENOUGH, relative=1e-6)
+
+
+def searched_scene(
+    scene: Scene,
+    target: Any,
+    classes: int,
+    tolerance: float,
+    starts: int,
+    rounds: int,
+    seed: int,
+    guesses: Array | None,
+    progress: Callable[[str], None] | None,
+    began: float,
+) -> Plan:
+    """The cheapest plan of a scene.
+
+    Raises:
+        SteeringError: nothing was found, which proves nothing.
+    """
+    task, say = scene.task, progress or (lambda line: None)
+    where, objective = f"steer({task.system.group.name})", scene.objective
     tried: list[str] = []
     found: list[Result] = []
     total = 0
@@ -93,9 +118,7 @@ def around(
     if not good:
         nearest = min(found, key=lambda each: max(each.off, -each.clearance))
         details |= {"agree": 0, "violation": {"end": nearest.off, "clearance": max(0.0, -nearest.clearance)}}
-        plan = plan_of(
-            task, target, nearest.flown, nearest.variant, tolerance, objective, details, took, Status.NOT_FOUND
-        )
+        plan = scene.plan(target, nearest, tolerance, details, took, Status.NOT_FOUND)
         raise SteeringError(
             f"{where}: not found, which proves nothing: the nearest of {total} starts ends {nearest.off:.3g} from the goal and cuts an obstacle "
             f"by {max(0.0, -nearest.clearance):.3g} (seed {seed}); it is in .best; more starts, more classes or another seed may find one",
@@ -103,19 +126,35 @@ def around(
             violation=plan.violation,
         )
     good.sort(key=lambda each: each.cost)
-    best = good[0]
-    details |= {
-        "winner": f"direct from {best.name}",
-        "agree": sum(each.cost <= best.cost * 1.01 for each in good),
-        "discretisation": f"{'continuous controls, linear on' if scene.linear else 'controls constant on'} "
-        f"{len(best.flown.inputs.first)} pieces",
-        "clearances": scene.clearances(best.flown),
+    facts = {
+        "agree": sum(each.cost <= good[0].cost * 1.01 for each in good),
         "classes": scene.named(good),
         "optimality": f"a local minimum, the cheapest of {len(good)} that were refined",
     }
-    if task.end.phases:
-        details["phase"] = task.end.phases[best.variant]
-    return plan_of(task, target, best.flown, best.variant, tolerance, objective, details, took)
+    different: list[Result] = []
+    for each in good:
+        if len(different) < _SHARPENED and all(abs(each.cost - one.cost) > _ALIKE * each.cost for one in different):
+            different.append(each)
+    plans = [
+        sharper(_plan(scene, target, each, tolerance, {**details, **facts}, took), scene, target, tolerance)
+        for each in different
+    ]
+    return min(plans, key=scene.objective_of) if objective in ("energy", "time") else plans[0]
+
+
+def _plan(
+    scene: Scene, target: Any, best: Result, tolerance: float, details: dict[str, Any], took: dict[str, float]
+) -> Plan:
+    """The plan of a result, with what is known of it."""
+    details |= {
+        "winner": f"direct from {best.name}",
+        "discretisation": f"{'continuous controls, linear on' if scene.linear else 'controls constant on'} "
+        f"{len(best.flown.inputs.first)} pieces",
+        "clearances": scene.clearances(best.flown),
+    }
+    if scene.task.end.phases:
+        details["phase"] = scene.task.end.phases[best.variant]
+    return scene.plan(target, best, tolerance, details, took, None)
 
 
 def _refuse_endless(task: Manoeuvre, where: str) -> None:
@@ -129,7 +168,12 @@ def _refuse_endless(task: Manoeuvre, where: str) -> None:
         )
 
 
-def _refuse_blocked(task: Manoeuvre, keep_out: KeepOut, obstacles: Sequence[Obstacle], where: str) -> None:
+def refuse_blocked(task: Manoeuvre, keep_out: KeepOut, obstacles: Sequence[Obstacle], where: str) -> None:
+    """Nothing, where both ends are clear.
+
+    Raises:
+        SteeringError: one is inside an obstacle.
+    """
     places = [("start", np.real(task.system.start))]
     end = task.end
     if end.elements is not None and not len(end.before) and not len(end.after):

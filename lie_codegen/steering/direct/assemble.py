@@ -18,7 +18,8 @@ from lie_codegen.steering.direct.programme import Goal, Programme
 from lie_codegen.steering.direct.system import System
 from lie_codegen.steering.end import End
 
-_EARLY, _LATE = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
+#: Weights of the earlier and the later Gauss point in the first of two exponentials, the other way round in the second.
+EARLY, LATE = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
 _GAUSS = 0.5 + np.array([-1, 1]) * math.sqrt(3) / 6
 #: Length |h a| of a step of two exponentials, and the most steps a piece is cut into.
 _STEP, _MOST_STEPS = 0.5, 8
@@ -104,7 +105,7 @@ def linear_pieces(task: Manoeuvre, pieces: int, speed: float, steps: int = 1) ->
     shares = []
     for step in range(steps):
         early, late = (step + _GAUSS) / steps
-        for a, b in ((_EARLY, _LATE), (_LATE, _EARLY)):
+        for a, b in ((EARLY, LATE), (LATE, EARLY)):
             shares.append(((a * (1 - early) + b * (1 - late)) / steps, (a * early + b * late) / steps))
     share = np.tile(shares, (pieces, 1))
     if task.system.steady:
@@ -132,7 +133,7 @@ def _pair(task: Manoeuvre, start: float, h: float, per_step: float = 1.0) -> lis
     drifts, directions = _sampled(task, start + h * _GAUSS)
     return [
         (h * (a * drifts[0] + b * drifts[1]), h / per_step * 2 * (a * directions[0] + b * directions[1]))
-        for a, b in ((_EARLY, _LATE), (_LATE, _EARLY))
+        for a, b in ((EARLY, LATE), (LATE, EARLY))
     ]
 
 

@@ -12,6 +12,7 @@ Of least time the duration is one more unknown: all velocities are multiplied by
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -29,7 +30,7 @@ _ARRIVE = 8
 #: Where chords between nodes are looked at, and how deep in an obstacle they are a way through it, in units of its size.
 _ALONG, _THROUGH = (0.2, 0.35, 0.5, 0.65, 0.8), 0.7
 #: Least duration, in units of the given one.
-_SHORTEST = 1e-3
+SHORTEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,11 @@ class Known:
     J: Array
     gap: Array
     A: Array
+
+    def lanes(self, u: Array) -> Lanes:
+        """The goal's rows and those of the nodes that cut an obstacle, as `numpy_search` asks for them."""
+        rows = np.concatenate([self.J, self.A * (self.gap < 0)[:, :, None]], axis=1)
+        return Lanes(u, self.size, np.concatenate([self.r, np.minimum(self.gap, 0.0)], axis=1), rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +80,7 @@ class Course:
         box = Box.of(self.programme)
         if not self.longest:
             return box
-        last = (_SHORTEST, self.longest, 1.0, 1.0)
+        last = (SHORTEST, self.longest, 1.0, 1.0)
         parts = (box.low, box.high, 0 * box.weight, box.mass)
         return Box(*(np.append(part, more) for part, more in zip(parts, last, strict=True)))
 
@@ -232,19 +238,55 @@ class Course:
         return found
 
     def look(self, _: Rows, u: Array) -> Lanes:
-        """The goal's rows and those of the nodes that cut an obstacle, as `numpy_search` asks for them."""
-        at = self.known(u)
-        rows = np.concatenate([at.J, at.A * (at.gap < 0)[:, :, None]], axis=1)
-        return Lanes(u, at.size, np.concatenate([at.r, np.minimum(at.gap, 0.0)], axis=1), rows)
+        """The goal's rows and those of the nodes that cut an obstacle."""
+        return self.known(u).lanes(u)
+
+    def followed(self, u: Array, along: Array, axes: Array, weight: Array) -> tuple[Known, Array, Array]:
+        """What is known at lanes (L, C), and how far their columns X e, e the rows of axes (a, d), are from `along` (nodes, a, d) at the
+        nodes, times weight (a,): (L, rows), with the derivatives (L, rows, C)."""
+        X, eta = self.states(u)
+        off = (np.einsum("lkij,aj->lkai", np.real(X[:, 1 + self.nodes]), axes) - along) * weight[:, None]
+        moved = self.columns_moved(X, eta, axes) * weight[:, None, None, None]
+        lanes, _, _, count, m, _ = moved.shape
+        rows = self.by_slots(np.moveaxis(moved, 5, 3).reshape(lanes, -1, count, m))
+        return self.known(u), off.reshape(lanes, -1), rows
 
 
-def arrive(course: Course, u: Array, settings: Settings) -> tuple[Array, Array]:
+class Clear(Protocol):
+    """A course, whatever drives it: what stages 1 and 2 ask for."""
+
+    @property
+    def box(self) -> Box:
+        """Limits and weights of a lane."""
+
+    def known(self, u: Array) -> Known:
+        """What a step needs at lanes (L, C)."""
+
+    def jumps(self, u: Array) -> Array:
+        """(L,) whether a lane goes through an obstacle in one step."""
+
+    def look(self, _: Rows, u: Array) -> Lanes:
+        """As `numpy_search` asks for it."""
+
+    def followed(self, u: Array, along: Array, axes: Array, weight: Array) -> tuple[Known, Array, Array]:
+        """How far lanes are from a way."""
+
+    @property
+    def nodes(self) -> Rows:
+        """The exponentials after which the obstacles are looked at."""
+
+    @property
+    def start(self) -> Array:
+        """(d, d) X(0)."""
+
+
+def arrive(course: Clear, u: Array, settings: Settings) -> tuple[Array, Array]:
     """Controls (L, C) near u that reach the goal and stay clear, and by how much they fail to (L,)."""
     found = reach(course.look, course.box, u, settings)
     return found.u, found.size
 
 
-def cheaper(course: Course, u: Array, settings: Settings) -> tuple[Array, float, int]:
+def cheaper(course: Clear, u: Array, settings: Settings) -> tuple[Array, float, int]:
     """Controls (C,) that reach the goal and stay clear as u does, at less cost; the cost, and steps taken."""
     box, enough = course.box, 100 * settings.enough
     best = float(box.objective(settings.fuel, u[None])[0])

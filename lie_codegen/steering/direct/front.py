@@ -57,10 +57,24 @@ def _torques(
     tolerance: float,
     options: Mapping[str, Any],
 ) -> Plan:
+    if options.get("obstacles"):
+        from lie_codegen.steering.direct.torque_around import torques_around
+
+        _refuse_others("direct, with torques among obstacles,", torque_options(), options)
+        if "longest" in options and options.get("objective") != "time":
+            raise SteeringInputError(f'steer({group.name}): longest is of objective="time"; leave it away')
+        return torques_around(group, target, controls, duration, tolerance, **options)
     from lie_codegen.steering.direct.torque_time import least_time_torques
 
     _refuse_others("direct, with torques,", set(least_time_torques.__kwdefaults__ or {}) | {"dynamics"}, options)
     return least_time_torques(group, target, controls, duration, tolerance, **options)
+
+
+def torque_options() -> set[str]:
+    """Names of the options that the direct method has under torques among obstacles."""
+    from lie_codegen.steering.direct.torque_around import torques_around
+
+    return set(torques_around.__kwdefaults__ or {}) | {"obstacles"}
 
 
 def _refuse_others(what: str, known: set[str], options: Mapping[str, Any]) -> None:

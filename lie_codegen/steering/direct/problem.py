@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError, SteeringInputError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
@@ -47,13 +48,23 @@ def manoeuvre(
     system = System(group, labels, directions, free, here, equation == "right")
     end = end_of(group, target, f"{where}: target")
     low, high = box_limits(labels, bounds, f"{where}: bounds")
-    w = np.ones(len(labels)) if weights is None else np.array(weights, dtype=float)
-    if w.shape != (len(labels),):
-        raise ShapeError(f"{where}: weights have shape {w.shape}; give one for each of {len(labels)} controls")
-    if not np.all(np.isfinite(w)) or np.any(w <= 0):
-        raise SteeringInputError(f"{where}: weights must be positive, got {w.tolist()}")
+    w = control_weights(weights, len(labels), where)
     require_reach(system, float(duration), end)
     return Manoeuvre(system, end, float(duration), low, high, w)
+
+
+def control_weights(weights: ArrayLike | None, m: int, where: str) -> Array:
+    """(m,) weights of the objective, ones if not given.
+
+    Raises:
+        ShapeError, SteeringInputError: not m positive numbers.
+    """
+    w = np.ones(m) if weights is None else np.array(weights, dtype=float)
+    if w.shape != (m,):
+        raise ShapeError(f"{where}: weights have shape {w.shape}; give one for each of {m} controls")
+    if not np.all(np.isfinite(w)) or np.any(w <= 0):
+        raise SteeringInputError(f"{where}: weights must be positive, got {w.tolist()}")
+    return w
 
 
 def piece_count(task: Manoeuvre) -> int:

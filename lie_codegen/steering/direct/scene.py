@@ -12,7 +12,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
-from lie_codegen.steering.direct.clear_search import Course, arrive, cheaper
+from lie_codegen.steering.direct.clear_search import Clear, Course, arrive, cheaper
 from lie_codegen.steering.direct.compiled import machine
 from lie_codegen.steering.direct.inputs import Drive
 from lie_codegen.steering.direct.magnus_flow import states_reached
@@ -20,7 +20,7 @@ from lie_codegen.steering.direct.numpy_search import Lanes, Rows, reach
 from lie_codegen.steering.direct.polish import Flown, corrected
 from lie_codegen.steering.direct.polish import flown as as_flown
 from lie_codegen.steering.direct.programme import Settings
-from lie_codegen.steering.direct.report import cost_of
+from lie_codegen.steering.direct.report import cost_of, plan_of
 from lie_codegen.steering.direct.starts import starts as first_controls
 from lie_codegen.steering.direct.starts import with_free_slots
 from lie_codegen.steering.obstacles.homotopy import Discs, planar_discs, resampled, shortest_classes
@@ -29,6 +29,7 @@ from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.obstacles.path_guess import word_text
 from lie_codegen.steering.obstacles.roadmap import Places, Space, drawn_into, seen, ways
 from lie_codegen.steering.obstacles.tunnels import tunnels
+from lie_codegen.steering.plan import Plan, Status
 
 #: Pieces of linear controls of the search, and of the plan.
 _COARSE, _FINE = 24, 64
@@ -110,21 +111,26 @@ class Scene:
         self, classes: int, seed: int, variant: int, straight: int, guesses: Array | None
     ) -> tuple[Array, list[str]]:
         """First controls on the coarse pieces (L, C), and where each comes from."""
-        nodes = _COARSE + self.linear
-        u = with_free_slots(self.task, first_controls(self.task, nodes, straight, seed, 0), seed)
-        flat = self.lasting(u)
-        lanes, names = [flat], [f"start {number}" for number in range(1, len(u) + 1)]
+        lanes = [self.begin(_COARSE, straight, seed, 0)]
+        names = [f"start {number}" for number in range(1, straight + 1)]
         if guesses is not None:
-            given = np.stack([_stretched(each, nodes) for each in guesses])
-            lanes.append(self.lasting(with_free_slots(self.task, given, seed)))
-            names += ["the guess given"] * len(given)
+            lanes.append(self.given(guesses, _COARSE, seed))
+            names += ["the guess given"] * len(guesses)
         course = self.course(_COARSE, variant)
         for number, way in enumerate(self.ways(classes, seed, variant), start=1):
-            again = first_controls(self.task, nodes, _EACH, seed, number)
-            begin = self.lasting(with_free_slots(self.task, again, seed))
-            lanes.append(self.following(course, way, begin))
+            lanes.append(self.following(course, way, self.begin(_COARSE, _EACH, seed, number)))
             names += [f"way {number}"] * _EACH
         return np.concatenate(lanes), names
+
+    def begin(self, pieces: int, count: int, seed: int, number: int) -> Array:
+        """First lanes (count, C) on so many pieces."""
+        u = first_controls(self.task, pieces + self.linear, count, seed, number)
+        return self.lasting(with_free_slots(self.task, u, seed))
+
+    def given(self, guesses: Array, pieces: int, seed: int) -> Array:
+        """Lanes of controls (k, S, m) that were given."""
+        own = np.stack([stretched(each, pieces + self.linear) for each in guesses])
+        return self.lasting(with_free_slots(self.task, own, seed))
 
     def lasting(self, u: Array) -> Array:
         """Controls (L, S, m) as lanes (L, C), with a duration each where the least is sought."""
@@ -142,24 +148,32 @@ class Scene:
             return [Places(path, np.tile(np.eye(3), (len(path), 1, 1))) for _, path in found]
         return ways(Space.between(self.keep_out, start, goal), classes, seed)
 
-    def course(self, pieces: int, variant: int, margins: Array | None = None) -> Course:
+    def course(self, pieces: int, variant: int, margins: Array | None = None) -> Clear:
         """The programme of that many pieces among the obstacles."""
         task = self.task
         speed = 4.0 / task.duration  # steps follow the integration that corrects; the search needs no more
-        steps = int(np.clip(np.ceil(_APART * self.travel / (pieces * np.min(self.keep_out.sizes))), 1, _STEPS))
+        steps = self.steps(pieces)
         programme = linear_pieces(task, pieces, speed, steps) if self.linear else constant_pieces(task, pieces, steps)
         first, last = task.free_slots
         own = len(programme.slot) - first - last
         # two exponentials make a step, and one where nothing changes on it
         nodes = np.arange(1, own, 2) if self.linear or not task.system.steady else np.arange(own)
-        # an obstacle thinner than a step is long would be jumped over: it counts as thick as that
-        thin = np.maximum(0.0, _APART * self.travel / len(nodes) - self.keep_out.sizes) * self.keep_out.placed
-        given = thin if margins is None else np.maximum(thin, margins)
+        given = self.kept(len(nodes), margins)
         goal = task.goal(np.array([variant]))
         system = task.system
         return Course(programme, goal, self.keep_out, system.start, first, nodes, given, self.longest, system.right)
 
-    def following(self, course: Course, way: Places, u: Array) -> Array:
+    def steps(self, pieces: int) -> int:
+        """Steps of a piece, so that obstacles are looked at often enough."""
+        thinnest = float(np.min(self.keep_out.sizes))
+        return int(np.clip(np.ceil(_APART * self.travel / (pieces * thinnest)), 1, _STEPS))
+
+    def kept(self, nodes: int, margins: Array | None) -> Array:
+        """(o,) gaps that are kept: an obstacle thinner than a step is long would be jumped over, and counts as thick as that."""
+        thin = np.maximum(0.0, _APART * self.travel / nodes - self.keep_out.sizes) * self.keep_out.placed
+        return np.asarray(thin if margins is None else np.maximum(thin, margins))
+
+    def following(self, course: Clear, way: Places, u: Array) -> Array:
         """Controls (L, C) that end at the goal, as near to the way as they can."""
         space = Space.between(self.keep_out, np.real(course.start), np.real(course.start))
         states = space.states(way)
@@ -170,23 +184,11 @@ class Scene:
         weight = _FOLLOW / np.maximum(size, 1e-9) / np.sqrt(len(at))
 
         def look(_: Rows, u: Array) -> Lanes:
-            at = course.known(u)
-            X, eta = course.states(u)
-            o = np.einsum("lkij,aj->lkai", np.real(X[:, 1 + course.nodes]), axes)
-            off = (o - along) * weight[:, None]
-            moved = course.columns_moved(X, eta, axes) * weight[:, None, None, None]
-            lanes, _, _, count, m, _ = moved.shape
-            rows = np.moveaxis(moved, 5, 3).reshape(lanes, -1, count, m)
-            J2 = course.by_slots(rows)
-            flat = off.reshape(lanes, -1)
-            total = np.sqrt(np.sum(at.r**2, axis=1) + np.sum(flat**2, axis=1))
+            at, off, rows = course.followed(u, along, axes, weight)
+            total = np.sqrt(np.sum(at.r**2, axis=1) + np.sum(off**2, axis=1))
             total = np.where(np.isfinite(total), total, np.inf)
-            return Lanes(
-                u,
-                total,
-                np.nan_to_num(np.concatenate([at.r, flat], axis=1)),
-                np.nan_to_num(np.concatenate([at.J, J2], axis=1)),
-            )
+            r, J = np.concatenate([at.r, off], axis=1), np.concatenate([at.J, rows], axis=1)
+            return Lanes(u, total, np.nan_to_num(r), np.nan_to_num(J))
 
         return reach(look, course.box, u, replace(self.settings, reach_iterations=_FOLLOWING)).u
 
@@ -220,7 +222,7 @@ class Scene:
 
     def refined(self, u: Array, variant: int, name: str) -> Result:
         """On the fine pieces, with margins where the true system cuts an obstacle between the nodes."""
-        v = self._finer(u)
+        v = self.finer(u, _COARSE, _FINE)
         margins = np.zeros(len(self.obstacles))
         best: Result | None = None
         for number in range(_AGAIN):
@@ -232,7 +234,7 @@ class Scene:
                 else replace(self.settings, descend_iterations=min(_LATER, self.settings.descend_iterations))
             )
             v, _, _ = cheaper(course, v, limit)
-            v, task, flown = self._confirmed(course, v, variant)
+            v, task, flown = self.confirmed(course, v, variant)
             X = self.states(flown)
             gaps = np.array([lowest(partial(self._gap, one), X) for one in range(len(self.obstacles))])
             through = tunnels(self.obstacles, X)
@@ -249,23 +251,25 @@ class Scene:
             raise ValueError("no round was made")
         return best
 
-    def _finer(self, u: Array) -> Array:
-        """Controls (C,) of the coarse pieces on the fine ones."""
+    def finer(self, u: Array, pieces: int, fine: int) -> Array:
+        """A lane (C,) of `pieces` pieces on `fine` ones."""
         task = self.task
         coarse = (u[:-1] if self.longest else u).reshape(-1, task.controls)
         before, after = task.free_slots
         own = task.own(coarse)
-        own = _stretched(own, _FINE + 1) if self.linear else own[np.arange(_FINE) * len(own) // _FINE]
-        fine = np.concatenate([coarse[:before], own, coarse[len(coarse) - after :]]).ravel()
-        return np.append(fine, u[-1]) if self.longest else fine
+        own = stretched(own, fine + 1) if self.linear else own[np.arange(fine) * len(own) // fine]
+        lane = np.concatenate([coarse[:before], own, coarse[len(coarse) - after :]]).ravel()
+        return np.append(lane, u[-1]) if self.longest else lane
 
-    def _confirmed(self, course: Course, v: Array, variant: int) -> tuple[Array, Manoeuvre, Flown]:
+    def confirmed(self, course: Clear, v: Array, variant: int) -> tuple[Array, Manoeuvre, Flown]:
         """The controls (C,) so that the true system is at the goal, the task with their duration, and how they were flown."""
         if self.longest:
             # arcs of constant velocity: the programme is the system
             task = replace(self.task, duration=float(v[-1]) * self.task.duration)
             return v, task, as_flown(task, v[:-1].reshape(-1, task.controls), variant, self.linear)
         task = self.task
+        if not isinstance(course, Course):
+            raise TypeError("a course of a chain is needed")
         solver = machine(task.system.group, task.controls)
         shape = v.reshape(-1, task.controls)
         shape, flown = corrected(task, solver, course.programme, shape, variant, self.linear, self.settings)
@@ -274,13 +278,54 @@ class Scene:
     def states(self, flown: Flown) -> Array:
         """States of the true system, so many that it moves by little between two, or cannot meet an obstacle there."""
         step = _LOOK * float(np.min(self.keep_out.sizes))
-        drive, parts = Drive(self.task.system, flown.inputs), 4
+        parts = 4
         while True:
-            X = np.real(states_reached(drive, parts)[1])
+            X = self.flight(flown, parts)
             moved = np.max(np.abs(np.diff(X @ self.keep_out.axes.T, axis=0)), initial=0.0)
             if moved <= step or parts >= _MOST_PARTS or self.keep_out.cleared(X):
                 return X
             parts *= 2
+
+    def flight(self, flown: Flown, parts: int) -> Array:
+        """States of the true system, that many a piece."""
+        return np.real(states_reached(Drive(self.task.system, flown.inputs), parts)[1])
+
+    def plan(
+        self, target: Any, best: Result, tolerance: float, details: dict[str, Any], took: dict[str, float], status: Status | None
+    ) -> Plan:  # fmt: skip
+        """The plan of a result."""
+        task, objective = self.task, self.objective
+        return plan_of(task, target, best.flown, best.variant, tolerance, objective, details, took, status)
+
+    def options(self) -> dict[str, Any] | None:
+        """The task as `lc.steer` has it for the transcription; None where that has no such task."""
+        task = self.task
+        system = task.system
+        known = set(system.labels) <= set(system.group.labels) and system.steady
+        if system.right or not known or self.objective not in ("energy", "time"):
+            return None
+        pairs = zip(task.low, task.high, strict=True)
+        return {
+            "obstacles": list(self.obstacles),
+            "objective": self.objective,
+            "bounds": {label: (float(a), float(b)) for label, (a, b) in zip(system.labels, pairs, strict=True)},
+            "weights": task.weights,
+            **({"drift": system.drift.constant} if np.any(system.drift.constant) else {}),
+            **({"start": system.start} if np.any(system.start != np.eye(system.group.degree)) else {}),
+            **({"longest": self.longest} if self.longest else {}),
+        }
+
+    def objective_of(self, plan: Plan) -> float:
+        """What is made small: the duration, or int sum w u^2 dt, exactly for controls that are linear between breakpoints."""
+        if self.longest:
+            return plan.duration
+        knots = np.unique(np.concatenate([[0.0], plan.u.breakpoints, [plan.duration]]))
+        h = np.diff(knots)
+        rows = [plan.group.labels.index(label) for label in self.task.system.labels]
+        # Simpson's rule is exact for squares of linear functions; a breakpoint belongs to the later piece
+        times = (knots[:-1], (knots[1:] + knots[:-1]) / 2, knots[1:] - 1e-9 * h)
+        squares = [plan.u(t)[:, rows] ** 2 @ self.task.weights for t in times]
+        return float(h @ (squares[0] + 4 * squares[1] + squares[2]) / 6)
 
     def clearances(self, flown: Flown) -> tuple[float, ...]:
         """Least of each obstacle's own clearance along the way."""
@@ -289,6 +334,10 @@ class Scene:
 
     def _gap(self, one: int, X: Array) -> Array:
         return np.asarray(self.keep_out.gaps(X)[..., one])
+
+    def word(self, X: Array) -> str | None:
+        """The class of a way between discs in the plane; None among other obstacles."""
+        return None if self.discs is None else word_text(self.discs.word(resampled(X[:, :2, 2], 257)))
 
     def named(self, good: Sequence[Result]) -> tuple[dict[str, Any], ...]:
         """{"word", "cost", "clearance"} of the cheapest result of each class of ways, the cheapest first."""
@@ -307,7 +356,7 @@ class Scene:
         return tuple(best.values())
 
 
-def _stretched(values: Array, nodes: int) -> Array:
+def stretched(values: Array, nodes: int) -> Array:
     """(k, m) values at equal times as (nodes, m)."""
     s, there = np.linspace(0, 1, nodes), np.linspace(0, 1, len(values))
     return np.column_stack([np.interp(s, there, column) for column in values.T])

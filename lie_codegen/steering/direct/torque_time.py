@@ -91,7 +91,7 @@ def least_time_torques(
     where = f"steer({group.name})"
     if objective != "time":
         raise SteeringInputError(
-            f'{where}: method="direct" finds torques of least time, objective="time"; others are for method="transcription"'
+            f'{where}: method="direct" finds torques of least time, objective="time", or among obstacles; others are for method="transcription"'
         )
     if isinstance(target, GoalSet):
         raise SteeringInputError(f"{where}: torques of least time go to an element, not to a {type(target).__name__}")

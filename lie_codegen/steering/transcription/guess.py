@@ -59,6 +59,26 @@ def given_guess(task: Task, intervals: int, drift: Array, guess: Any) -> Array:
     return values
 
 
+def plan_variables(task: Task, structure: Structure, numbers: Numbers, plan: Plan) -> Array | None:
+    """All variables as a plan has them, its states, velocities and duration too; None of a plan of another kind of motion than is asked for.
+
+    A right-invariant plan is of another kind, and so are velocities where torques are asked for. A plan that lasts another time than the task
+    is run through in the task's, unless the duration is found.
+    """
+    details, second = plan.details, numbers.dynamics
+    system = details.get("system")
+    if (details.get("inertia") is None) != (second is None) or (system is not None and system.right):
+        return None
+    s = np.linspace(0, 1, structure.intervals + 1)
+    t = s * plan.duration
+    slower = 1.0 if structure.free_time else plan.duration / task.duration
+    scale = float(np.clip(plan.duration / task.duration, 1e-3, numbers.longest)) if structure.free_time else 1.0
+    v = plan.u(t)[:, list(task.controls)] * (slower * task.duration) ** numbers.power
+    xi = None if second is None else plan.xi(t) * slower * task.duration
+    X = plan.X(t)
+    return joined(structure, np.linalg.solve(X[:1], X), xi, v, scale)
+
+
 def class_guesses(
     task: Task, structure: Structure, numbers: Numbers, classes: int, turns: tuple[int, ...]
 ) -> list[PathGuess]:

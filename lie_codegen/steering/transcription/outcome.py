@@ -34,7 +34,7 @@ def classes_found(
         way = each.motion.X[:, :2, 2]
         word = word_text(discs.word(way))
         clear = float(np.min(discs.clearance(way)))
-        cost = each.duration * duration if time else each.objective / duration
+        cost = each.duration * duration if time else each.objective / duration ** (2 * numbers.power - 1)
         best.setdefault(word, {"word": word, "cost": cost, "clearance": clear})
     return tuple(best.values())
 

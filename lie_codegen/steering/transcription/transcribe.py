@@ -30,6 +30,7 @@ from lie_codegen.steering.transcription.guess import (
     first_variables,
     given_guess,
     guesses,
+    plan_variables,
 )
 from lie_codegen.steering.transcription.nondimensional import nondimensional
 from lie_codegen.steering.transcription.numbers import Numbers, Options
@@ -129,7 +130,12 @@ def _candidates(bench: Workbench, asked: Options) -> list[Candidate]:
     found = []
     for name, v in _guesses(bench, asked):
         try:
-            first = first_variables(bench.task, bench.structure, bench.numbers, v)
+            first = None
+            if isinstance(v, Plan):
+                first = plan_variables(bench.task, bench.structure, bench.numbers, v)
+                v = given_guess(bench.task, bench.structure.intervals, bench.numbers.drift, v)
+            if first is None:
+                first = first_variables(bench.task, bench.structure, bench.numbers, v)
             found.append(refined(bench, name, first, predicted_end(bench, first)))
         except ComputationError as error:
             bench.say(f"from {name}: {error}")
@@ -149,15 +155,17 @@ def _idle(numbers: Numbers, candidate: Candidate) -> bool:
     return all(float(np.min(each.clearance(motion.X))) > _IDLE for each in numbers.obstacles)
 
 
-def _guesses(bench: Workbench, asked: Options) -> Iterator[tuple[str, Array]]:
-    """The caller's own, and the others."""
+def _guesses(bench: Workbench, asked: Options) -> Iterator[tuple[str, Array | Plan]]:
+    """The caller's own, as velocities in unit time or as the plan that it is, and the others."""
     # Beside flat walls, and in least time, ways differ: of three starts none arrived where of eight some did, or the best took up to 1.6
     # times as long. Around balls and cones least energy is the same from three.
     walls, in_time = bench.structure.solids > 0, bench.structure.free_time and bool(bench.numbers.obstacles)
     usual = _AMONG_WALLS if walls or in_time else _STARTS
     starts = usual if asked.starts is None else asked.starts
     yield from guesses(bench.task, bench.structure, bench.numbers, starts)
-    if asked.guess is not None:
+    if isinstance(asked.guess, Plan):
+        yield "the guess given", asked.guess
+    elif asked.guess is not None:
         yield "the guess given", given_guess(bench.task, bench.structure.intervals, bench.numbers.drift, asked.guess)
 
 
