@@ -72,6 +72,7 @@ def test_what_a_step_knows_changes_as_its_derivatives_say(objective: str, side: 
         assert slope == pytest.approx(known.r[0] @ known.J[0, :, k] + cut @ known.A[0, :, k], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_torques_turn_a_body_past_a_cone_from_rest_to_rest() -> None:
     so3, inertia = lc.group("so3"), np.diag([3.0, 2.0, 1.0])
     R, cone = expm(so3.hat([0, 0, 2.0])), lc.Cone((1, 0, 0), (np.cos(1), np.sin(1), 0), 0.4)

@@ -14,7 +14,7 @@ from lie_codegen.steering.constraints import Obstacle
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.clear_search import Clear, Course, arrive, cheaper
 from lie_codegen.steering.direct.compiled import machine
-from lie_codegen.steering.direct.inputs import Drive
+from lie_codegen.steering.direct.inputs import Drive, Inputs
 from lie_codegen.steering.direct.magnus_flow import states_reached
 from lie_codegen.steering.direct.numpy_search import Lanes, Rows, reach
 from lie_codegen.steering.direct.polish import Flown, corrected
@@ -319,6 +319,9 @@ class Scene:
         """What is made small: the duration, or int sum w u^2 dt, exactly for controls that are linear between breakpoints."""
         if self.longest:
             return plan.duration
+        inputs = plan.details.get("inputs")
+        if isinstance(inputs, Inputs):
+            return inputs.integral_of_squares(self.task.weights)
         knots = np.unique(np.concatenate([[0.0], plan.u.breakpoints, [plan.duration]]))
         h = np.diff(knots)
         rows = [plan.group.labels.index(label) for label in self.task.system.labels]
