@@ -115,7 +115,7 @@ def _guard(
     def guarded(*args: Any, **named: Any) -> Any:
         try:
             refuse_lost_parts()
-            if has_masks(args) or (named and has_masks(named.values())):
+            if has_masks(args[1:] if bound else args) or (named and has_masks(named.values())):
                 raise ArgumentError(
                     f"{name}: an array has masked entries, which are no numbers; fill them (.filled(...))"
                 )
