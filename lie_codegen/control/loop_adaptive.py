@@ -30,7 +30,7 @@ def loop_system(loop: Loop, library: Library, numbers: Mapping[str, Array]) -> S
     reach = min(reach_of(move.group, closed=move.derivation.closed_exponential) for move in moves)
     turns = sum(move.group.dim for move in moves)
     given = tuple(numbers[port.name] for port in library.loop_rate.inputs[3:])
-    return System(library.loop_rate, library.loop_settle, turns, reach, given)
+    return System(library.loop_rate, library.loop_settle, turns, reach, given, steady=loop.steady)
 
 
 def _system(run: Run) -> System:

@@ -79,6 +79,12 @@ class Loop:
         return self.moving and self.law is not None and not self.law.has("reference")
 
     @cached_property
+    def steady(self) -> bool:
+        """Whether nothing in it is known to read the time: no reference, no force but a constant one, no law with an input t."""
+        timed = any(law.has("time") for law in (self.law, self.observer) if law is not None)
+        return not (self.moving or timed or self.external is not None) and self.disturbance in (None, "input")
+
+    @cached_property
     def own_ports(self) -> tuple[LoopPort, ...]:
         """States of the law, then of the observer."""
         return tuple(each for law in (self.law, self.observer) if law is not None for each in law.states)

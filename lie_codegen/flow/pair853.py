@@ -27,7 +27,7 @@ _BLOCK = 64
 _PILOT, _MARGIN = 16, 4.0
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 16.0
-#: Times at which two runs of a single member are compared: those of the longer steps need not end at all that were asked for.
+#: Times at which two runs of a single member of a steady system are compared: the longer steps need not end at all that were asked for.
 _COMPARED = 8
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Steps that are tried at most: some seconds.
@@ -130,7 +130,7 @@ def _to_tolerance(
     # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
     share, one = 1.0, len(X0) == 1
     # the last time and those a whole number of places before it, but for the first
-    apart = -(-(len(times) - 1) // _COMPARED) if one else 1
+    apart = -(-(len(times) - 1) // _COMPARED) if one and system.steady else 1
     compared = slice((len(times) - 1) % apart or apart, None, apart)
     coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), rtol, atol + rtol, where)
     X, y = coarse.X[1:], coarse.y[1:]

@@ -25,6 +25,8 @@ class System:
         group: n, entries of Theta.
         reach: |Theta| up to which a step may go.
         numbers: the other inputs of the rate in its order, of all members (*shape) or one each (N, *shape).
+        steady: whether the rate is known not to read t. Another may change within a moment that only steps which end at all times
+            that were asked for get past.
     """
 
     rate: Compiled[Any]
@@ -32,6 +34,7 @@ class System:
     group: int
     reach: float
     numbers: tuple[Array, ...] = ()
+    steady: bool = False
 
     @cached_property
     def packed(self) -> int:
