@@ -69,7 +69,7 @@ class Condition:
         rows: how many conditions.
         columns: where each column of the Jacobian's nonzeros starts, and their number.
         row_indices: the rows of the nonzeros.
-        curve_places: where its second derivatives go among those of a stage.
+        curve_places: where its second derivatives go among those of its stage.
     """
 
     name: str
@@ -90,7 +90,8 @@ class Layout:
         intervals, stage, width, parameters: numbers of intervals, of variables of a stage without and with r, of parameters.
         kind_of, goal_of: for each node its kind, and where its goal is among the parameters.
         columns, row_indices: nonzeros of the Jacobian of `next`.
-        curve: (columns, rows) of the second derivatives of a stage.
+        curve: (columns, rows) of the second derivatives of a stage with an interval.
+        last_curve: the same of the last stage, which has none.
         kinds: the conditions.
     """
 
@@ -105,6 +106,7 @@ class Layout:
     columns: tuple[int, ...]
     row_indices: tuple[int, ...]
     curve: tuple[tuple[int, ...], tuple[int, ...]]
+    last_curve: tuple[tuple[int, ...], tuple[int, ...]]
     kinds: tuple[Condition, ...]
 
 
@@ -129,6 +131,7 @@ class NlpView:
     most_rows: int
     most_entries: int
     curve_entries: int
+    last_curve_entries: int
     kind_of: tuple[int, ...]
     goal_of: tuple[int, ...]
     interval_columns: tuple[int, ...]
@@ -155,6 +158,7 @@ def render_nlp(layout: Layout, functions: Sequence[Any]) -> str:
         most_rows=max(1, *(kind.rows for kind in layout.kinds)),
         most_entries=max(1, len(layout.row_indices), *(len(kind.row_indices) for kind in layout.kinds)),
         curve_entries=len(layout.curve[1]),
+        last_curve_entries=len(layout.last_curve[1]),
         kind_of=layout.kind_of,
         goal_of=layout.goal_of,
         interval_columns=layout.columns,
@@ -197,7 +201,8 @@ def _patterns(layout: Layout) -> dict[str, tuple[int, ...]]:
                 rows.append(before + j)
             if k < N:
                 rows += [row + i for i in layout.row_indices[layout.columns[j] : layout.columns[j + 1]]]
-                curve_rows += [k * width + i for i in layout.curve[1][layout.curve[0][j] : layout.curve[0][j + 1]]]
+            columns, entries = layout.curve if k < N else layout.last_curve
+            curve_rows += [k * width + i for i in entries[columns[j] : columns[j + 1]]]
             rows += [row + own + i for i in kind.row_indices[kind.columns[j] : kind.columns[j + 1]]]
             starts.append(len(rows))
             curve_starts.append(len(curve_rows))

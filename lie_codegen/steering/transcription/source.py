@@ -46,6 +46,8 @@ def source(structure: Structure, solver: str) -> str:
         slope = piece.slope.sparsity_out(1)
         own = _own_curve(piece, pattern)
         places = pattern.get_nz([r + c * structure.width for r, c in zip(*own.get_triplet(), strict=True)])
+        if kind == "last":  # no interval begins at the last node: its second derivatives are those of its conditions alone
+            places = list(range(own.nnz()))
         kinds.append(Condition(kind, number, piece.rows, *_compressed(slope), tuple(places)))
     slope = step.slope.sparsity_out(1)
     nodes = range(structure.intervals + 1)
@@ -61,6 +63,7 @@ def source(structure: Structure, solver: str) -> str:
         columns=_compressed(slope)[0],
         row_indices=_compressed(slope)[1],
         curve=_compressed(pattern),
+        last_curve=_compressed(_own_curve(paths["last"], pattern)),
         kinds=tuple(kinds),
     )
     return render_nlp(layout, functions)
