@@ -46,7 +46,9 @@ def source(structure: Structure, solver: str) -> str:
         slope = piece.slope.sparsity_out(1)
         own = _own_curve(piece, pattern)
         places = pattern.get_nz([r + c * structure.width for r, c in zip(*own.get_triplet(), strict=True)])
-        if kind == "last":  # no interval begins at the last node: its second derivatives are those of its conditions alone
+        if (
+            kind == "last"
+        ):  # no interval begins at the last node: its second derivatives are those of its conditions alone
             places = list(range(own.nnz()))
         kinds.append(Condition(kind, number, piece.rows, *_compressed(slope), tuple(places)))
     slope = step.slope.sparsity_out(1)
