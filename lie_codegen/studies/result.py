@@ -15,7 +15,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.door import guard_methods
 from lie_codegen.errors import ComputationError, InputError, write_refusal
 from lie_codegen.studies.driver import Job
-from lie_codegen.studies.store import DONE, FAILED, Store
+from lie_codegen.studies.store import DONE, FAILED, NOT_YET, Store
 from lie_codegen.studies.tasks import SampleStatus
 from lie_codegen.studies.work import Work
 from lie_codegen.whole_files import whole_file
@@ -101,7 +101,10 @@ class Study:
         """All samples of an input or an output."""
         if name not in {*self.inputs, *self.outputs, "status"}:
             raise InputError(f"study: no {name!r}; there are {', '.join([*self.inputs, *self.outputs, 'status'])}")
-        return self._store.read(name, 0, self.n)
+        found = self._store.read(name, 0, self.n)
+        if name == "status":  # a chunk that was cut off may have written it, and is run again whole
+            found[np.repeat(self._store.done() == NOT_YET, self._store.chunk)[: self.n]] = SampleStatus.NOT_RUN
+        return found
 
     @property
     def dataset(self) -> Any:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import zarr
 
 FORMAT, VERSION, KEY = "lie_codegen study", 1, "lie_codegen_study"
-DONE, FAILED = 1, 2
+NOT_YET, DONE, FAILED = 0, 1, 2
 _MESSAGE = 400
 #: A file holds at most so many samples of an array; a larger task is one file of several such pieces (zarr's sharding).
 _PIECE = 10_000
@@ -151,9 +151,12 @@ class Store:
         return k * self.chunk, min(self.chunk, self.n - k * self.chunk)
 
     def write(self, k: int, columns: Mapping[str, Array]) -> None:
-        """All of a chunk; that it is done is written last, so a chunk that was cut off is not done."""
+        """All of a chunk; that it is done is written last, so a chunk that was cut off is not done.
+
+        What became of the samples comes after what they are: who reads the file finds none that is said to be there and is not.
+        """
         first, count = self.span(k)
-        for name, column in columns.items():
+        for name, column in sorted(columns.items(), key=lambda item: item[0] == "status"):
             self._array(name)[first : first + count] = column
         self._array("study_bits")[k] = bit_class()
         self._array("study_done")[k] = DONE

@@ -67,7 +67,8 @@ LONG = {
 def test_ctrl_c_ends_it_within_a_second(name: str) -> None:
     """Of processor time: the machine may be busy with other things."""
     code = f"""
-import resource, sys, time
+import resource, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background is born deaf to it
 import numpy as np, lie_codegen as lc
 from lie_codegen.flow.libraries import integrators
 step = integrators(lc.group("so3")).rkmk4_step

@@ -88,6 +88,41 @@ def test_a_driver_that_is_killed(undisturbed: lc.Study, tmp_path: Path, reposito
     assert study.digest() == undisturbed.digest()
 
 
+def test_a_chunk_that_was_cut_off_is_not_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Killed at the n-th array of a chunk: whatever was written of it, its samples have not been run, and are run again."""
+    whole = lc.study(cases.plain, cases.SPACE, chunk=100, store=tmp_path / "whole.zarr", **QUIET)
+    chosen = Store._array
+    for cut in range(1, 12):
+        store = tmp_path / f"{cut}.zarr"
+        lc.study(cases.plain, cases.SPACE, chunk=100, store=store, **QUIET)
+        again = Store(store)
+        again._array("study_done")[7] = 0
+        again._array("status")[700:800] = -1
+        columns = {name: np.zeros_like(whole[name][:100]) for name in (*whole.outputs, "status")}
+        asked = [0]
+
+        def killed(self: Store, name: str, asked: list[int] = asked, cut: int = cut) -> Any:
+            asked[0] += 1
+            if asked[0] == cut:
+                raise KeyboardInterrupt
+            return chosen(self, name)
+
+        monkeypatch.setattr(Store, "_array", killed)
+        try:
+            again.write(7, columns)
+            monkeypatch.setattr(Store, "_array", chosen)
+            break
+        except KeyboardInterrupt:
+            monkeypatch.setattr(Store, "_array", chosen)
+        study = lc.open_study(store)
+        assert study.status["done"] == 1900
+        assert study.status["not_run"] == 100
+        assert set(np.flatnonzero(study["status"] == -1)) == set(range(700, 800))
+        lc.study(cases.plain, cases.SPACE, store=store, **QUIET)
+        assert np.array_equal(lc.open_study(store)["sum"], whole["sum"])
+    assert cut > len(columns)
+
+
 def test_a_full_disk_loses_nothing(undisturbed: lc.Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     real, written = Store.write, []
 
