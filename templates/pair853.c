@@ -220,12 +220,9 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
         error = judged(p, p->y, after, h, k);
         if (!(error <= 1.0) || error < 0.0) {
             ++p->rejected;
-            if (error < 0.0) {
-                p->h = 0.9 * h / -error; /* Theta grows about as h does: this length ends at 0.9 of its reach */
-            } else {
-                const double factor = 0.9 * pow(error, -1.0 / 8);
-                p->h = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN */
-            }
+            /* Theta grows about as h does: the first length ends at 0.9 of its reach */
+            const double factor = error < 0.0 ? 0.9 / -error : 0.9 * pow(error, -1.0 / 8);
+            p->h = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN, and where the stages ran away: how far says nothing */
             if (!(p->h > 1e-15 * fabs(p->t)) || p->h < 1e-300) { /* t + h would be t */
                 return error <= 1e300 ? STUCK : LOST;
             }

@@ -120,6 +120,19 @@ def test_a_law_flies_the_plan(method: str) -> None:
     assert tilted.outputs["W"][-1] < tilted.outputs["W"][0] / 10
 
 
+@pytest.mark.parametrize("count", [2, 3, 4, 6, 9, 14])
+def test_a_jump_that_long_steps_meet_first_is_passed(count: int) -> None:
+    """The stages of a step across the ramp run away; the step that follows was a 1e58th of it, and none was short enough."""
+    plan = Bang()
+    reference = lc.reference("so3", plan)
+    law = lc.tracking_law("so3", inertia=[1, 2, 2], error="so3_right", gains={"K_p": [4, 5, 6], "K_d": 4})
+    t, start = np.linspace(0, plan.duration, count), np.asarray(plan.u(0.0))
+    run = lc.closed_loop("so3", law=law, reference=reference, xi0=start, t=t, tolerance=1e-8)
+    path_there, velocity, _ = values(reference, t)
+    assert np.max(np.abs(run.X - path_there)) < 1e-7
+    assert np.max(np.abs(run.xi - velocity)) < 1e-6
+
+
 def test_it_is_a_value() -> None:
     plan = lc.steer("so3", TARGET, list(SO3.labels[:2]), 10, method="optimal")
     reference = lc.reference("so3", plan)
