@@ -49,6 +49,16 @@ def test_what_falls_short_of_the_goal_is_said() -> None:
     )
 
 
+def test_a_peer_that_is_outrun_is_asked_for_three_targets(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bounded, "PEERS", {"GRAPE in forty lines": grape})
+    monkeypatch.setattr(bounded, "_OUTRUN", 0.0)
+    row = bounded.bench_bounded(targets=5, only="SU(2)")[-1]
+    assert (row.solved, row.targets) == (3, 3)
+    ours = bounded.BoundedRow("a task", "lie_codegen, least energy", 9, 10, 1.0, 1.0)
+    peer = bounded.BoundedRow("a task", "CasADi + ipopt", 3, 3, 1.0, 200.0)
+    assert "reaches 3 of 3" in bounded.missed([ours, peer])[0]
+
+
 def test_cars_are_as_short_as_the_closed_form() -> None:
     ours, closed = bounded.bench_bounded(targets=2, only="Dubins")
     assert ours.solved == closed.solved == 2
