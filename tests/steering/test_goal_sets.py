@@ -155,3 +155,16 @@ def test_the_open_layer_takes_a_gate_up_to_its_phase() -> None:
     plan = lc.steer(su2, lc.UpToPhase(gate), ("sx", "sy"), 1.0, method="ocp")
     assert plan.cost == pytest.approx(15.507140, rel=1e-3)
     assert abs(np.vdot(gate, plan.X_final)) / 2 == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["so3", "su2", "se2", "se3", "h3"])
+@pytest.mark.parametrize("method", ["optimal", "direct"])
+def test_a_set_that_holds_the_start_is_met_at_rest(name: str, method: str) -> None:
+    """On SU(2) a whole loop was returned: the costate of rest is zero, and |F mu| / |mu| was asked of it."""
+    group = lc.group(name)
+    label = group.labels[-1]
+    element = expm(group.hat(0.7 * np.eye(group.dim)[-1]))
+    plan = lc.steer(name, lc.Coset(element, free=(label,)), list(group.labels[:-1]), 2.0, method=method)
+    assert plan.cost < 1e-20
+    assert np.max(np.abs(plan.X(2.0) - np.eye(group.degree))) < 1e-9
+    assert not plan.details.get("focal_times")

@@ -31,7 +31,7 @@ class Met:
         extremal: the extremal.
         target: (d, d) the element of the set that it ends at.
         miss: |vee(T^-1 X(1))|.
-        transversality: |F mu(1)| relative to |mu(1)|.
+        transversality: |F mu(1)| relative to |mu(1)|; 0 at rest.
     """
 
     extremal: Extremal
@@ -96,7 +96,9 @@ def _measured(extremal: Extremal, target: Array, free: Array) -> Met:
     away = np.linalg.solve(target, extremal.X[-1]) - np.eye(len(target))
     across = free @ extremal.costates[-1]
     size = float(np.linalg.norm(extremal.costates[-1]))
-    return Met(extremal, target, float(np.linalg.norm(away)), float(np.linalg.norm(across)) / max(size, 1e-300))
+    # a costate of rounding is rest: where the set holds the start no motion is the best, and has no direction to be transversal in
+    transversality = float(np.linalg.norm(across)) / size if size > _THERE else 0.0
+    return Met(extremal, target, float(np.linalg.norm(away)), transversality)
 
 
 def focal_times(extremal: Extremal, free: Array) -> tuple[float, ...]:
@@ -123,9 +125,15 @@ def focal_times(extremal: Extremal, free: Array) -> tuple[float, ...]:
         carried = group.project(relative @ group.basis @ np.linalg.inv(relative)).T
         matrices.append((t, np.vstack([outside @ (xi[-1] - carried @ xi[number]), bottom])))
     times = np.array([t for t, _ in matrices])
-    stack = np.array([matrix / np.linalg.norm(matrix, axis=1, keepdims=True) for _, matrix in matrices])
+    # rows without a length (at rest the lower ones) stay zero: their matrix is singular, of no known sign
+    stack = np.array([_of_unit_rows(matrix) for _, matrix in matrices])
     sizes = np.linalg.svd(stack, compute_uv=False)
     known = np.flatnonzero(sizes[:, -1] > 1e-7 * sizes[:, 0])
     sign = np.linalg.slogdet(stack[known])[0]
     changes = np.flatnonzero(sign[1:] != sign[:-1])
     return tuple(float((times[known[k]] + times[known[k + 1]]) / 2) for k in changes)
+
+
+def _of_unit_rows(matrix: Array) -> Array:
+    lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
+    return np.asarray(np.divide(matrix, lengths, out=np.zeros_like(matrix), where=lengths > 0))
