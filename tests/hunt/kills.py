@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import lie_codegen as lc
 from lie_codegen.errors import LieCodegenError
@@ -103,11 +104,10 @@ def _torn(home: Path) -> list[str]:
     wrong = []
     for name in SAVED:
         path = home / name
-        if path.exists() and path.read_bytes() not in _both(name):
-            wrong.append(f"{name} is half written")
-        if path.exists() and path.suffix == ".npz":
+        if path.exists():
             try:
-                lc.load(path)
+                if _read(path) not in _both(name):
+                    wrong.append(f"{name} is half written")
             except LieCodegenError as error:
                 wrong.append(f"{name}: {error}")
     for name in PACKAGES:
@@ -125,11 +125,16 @@ def _torn(home: Path) -> list[str]:
     return wrong
 
 
-def _both(name: str) -> list[bytes]:
-    """A file as each of the two writes leaves it."""
+def _read(path: Path) -> Any:
+    """What a file says; of results the values, for how long a plan took is another figure in every process."""
+    return lc.load(path) if path.suffix == ".npz" else path.read_bytes()
+
+
+def _both(name: str) -> list[Any]:
+    """What a file says as each of the two writes leaves it."""
     with tempfile.TemporaryDirectory(prefix="hunt-") as folder:
         found = []
         for new in (False, True):
             torn.FILES[name](Path(folder) / name, new)
-            found.append((Path(folder) / name).read_bytes())
+            found.append(_read(Path(folder) / name))
     return found
