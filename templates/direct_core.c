@@ -13,13 +13,12 @@ enum { NEWTON = 6 }; /* proximal steps before the first of Newton's, which far f
 /* A lane whose cost less this many times the gain to expect stays above what another has ended at is left where it is. */
 #define HOPE 2.0
 
-/* Keeps of `bracket` what acts: of sixteen Pauli strings four controls and a drift are five. */
-static void restrict_bracket(task *w, double *memory)
+/* Keeps of `bracket` what acts: of sixteen Pauli strings four controls and a drift are five. Numbers go to `value`, pairs of indices to `indices`. */
+static void restrict_bracket(task *w, double *value, void *indices)
 {
     const programme *p = w->p;
     const sparse *all = &p->bracket;
-    double *value = memory;
-    int *j = (int *)(memory + all->first[N]), *k = j + all->first[N];
+    int *j = indices, *k = j + all->first[N];
     unsigned char there[N] = {0};
     int i, n, m, row, count = 0;
     for (row = 0; row < p->rows; ++row) {
@@ -75,7 +74,8 @@ static void begin(task *w, const programme *p, int lanes, int first, double *mem
     w->twice = w->within + K * M * M;
     w->Z = w->twice + N * N;
     w->ad = w->Z + N * ENTRIES;
-    restrict_bracket(w, (double *)(w->ad + p->bracket.first[N]));
+    next = w->ad + p->bracket.first[N];
+    restrict_bracket(w, (double *)next, (double *)next + p->bracket.first[N]);
     w->plain = 1;
     for (e = 0; e < ENTRIES; ++e) {
         w->plain &= p->right[e] == (e % ((D + 1) * PARTS) == 0 ? 1.0 : 0.0);
