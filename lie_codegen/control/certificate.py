@@ -30,6 +30,7 @@ from lie_codegen.control.invariance import invariance
 from lie_codegen.control.level_search import LevelSearch
 from lie_codegen.control.tracking_law import FEEDFORWARDS
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.exact.counts import seeded
 from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -106,7 +107,7 @@ def certificate(
     if moving:
         bound = 2.0 if reach is None else float(reach)
     # b_1, b_2 and h belong to phi and to the level alone; how fast the reference turns enters the pointwise rate, so that speed is 0 here.
-    search = LevelSearch(samples, body, level, 0.0, np.random.default_rng(seed), moving=moving, reach=bound)
+    search = LevelSearch(samples, body, level, 0.0, seeded(seed, "certificate"), moving=moving, reach=bound)
     b_1, b_2 = quadratic_bounds(search, metric, stiffness)
     h, t = hessian_bound(search, metric), metric.turning()
     damping = scipy.linalg.eigh(K_d, body, eigvals_only=True)
@@ -114,7 +115,7 @@ def certificate(
     theorem = TheoremNumbers(b_1, b_2, h, t, share * float(damping[0]), float(damping[-1]), float(speed))
     if speed:
         search = LevelSearch(
-            samples, body, level, float(speed), np.random.default_rng(seed), moving=moving, reach=bound
+            samples, body, level, float(speed), seeded(seed, "certificate"), moving=moving, reach=bound
         )
     pointwise = PointwiseRate(search, metric, K_d, feedforward, b_2, share)
     if epsilon is None:

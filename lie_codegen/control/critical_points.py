@@ -27,6 +27,7 @@ from lie_codegen.control.error_inputs import refuse_inputs
 from lie_codegen.control.error_samples import ErrorSamples, basis_scales, error_samples, random_elements
 from lie_codegen.control.euler_characteristic import euler_characteristic
 from lie_codegen.errors import InputError
+from lie_codegen.exact.counts import seeded
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.kernel.saved import Saved
@@ -119,7 +120,7 @@ def found_points(pair: ErrorFunction, seed: int = 0) -> CriticalPoints:
     Raises:
         InputError: as `critical_points`.
     """
-    samples, rng = error_samples(refuse_inputs(pair)), np.random.default_rng(seed)
+    samples, rng = error_samples(refuse_inputs(pair)), seeded(seed, "critical_points")
     check_positive(pair, samples, rng)
     if pair.uses_log:
         return _up_to_the_cut(pair, samples, rng)

@@ -22,6 +22,9 @@ from lie_codegen.signals.periodic_input import PeriodicInput
 _AGREEMENT = 2e-14
 _MOST_STEPS = 2**17
 
+#: A step of the sixth order can be right up to about so much motion.
+_WITHIN = 10.0
+
 
 @dataclass(frozen=True)
 class ReferenceFlow:
@@ -46,9 +49,15 @@ def reference_flow(
     """The solution on [0, horizon], sampled `per_period` times a period and at the breakpoints.
 
     Raises:
-        ComputationError: if the steps do not converge (name the breakpoints of a non-smooth input).
+        ComputationError: if the steps do not converge (name the breakpoints of a non-smooth input), or cannot: u is too large.
     """
     knots = np.unique(np.concatenate([np.linspace(0.0, u.T, per_period + 1), u.breakpoints]))
+    shortest = float(np.abs(eps * u(knots)).max()) * u.T / _MOST_STEPS
+    if not shortest <= _WITHIN:
+        raise ComputationError(
+            f"reference_flow({group.name}): eps u moves by {shortest:.2g} within the shortest of {_MOST_STEPS} steps a period, "
+            f"of which no series is the flow; make eps or u smaller"
+        )
     parts = 4
     coarse = _one_period(group, u, eps, knots, parts)
     while True:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotOnGroupError, ShapeError, SteeringError, SteeringInputError
+from lie_codegen.exact.counts import seeded
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.flow.simulate import simulate
@@ -80,7 +81,7 @@ def feedback(
     push = np.zeros(n) if disturbance is None else np.asarray(disturbance, dtype=float)
     if push.shape != (n,) or not np.all(np.isfinite(push)):
         raise ShapeError(f"{where}: disturbance must be {n} finite numbers, got {disturbance!r}")
-    rng = np.random.default_rng(seed)
+    rng = seeded(seed, "feedback")
     span = task.duration / steps
     X = np.eye(group.degree, dtype=complex if group.is_complex else float)
     parts: list[Controls] = []

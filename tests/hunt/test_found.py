@@ -228,3 +228,25 @@ def test_magnitudes_of_the_open_layer_are_those_of_steering() -> None:
     for option in ("penalty", "sample"):
         with pytest.raises(lc.errors.InputError, match=option):
             lc.mpc(problem(1.0), **{option: np.longdouble("1e400")})
+
+
+@pytest.mark.parametrize("seed", ["a list that holds itself", "a list of None", "a ragged list"])
+def test_seeds_are_whole_numbers(seed: str) -> None:
+    """NumPy reads a list that holds itself until the stack ends, which ended the process."""
+    bad = hostile.HOSTILE[seed]()
+    certified = {each: make() for each, make in plausible.plausible_arguments(lc.certificate).items()}
+    estimate = lc.Uncertain("so3", np.eye(3), np.eye(3) * 1e-4)
+    problem = lc.ocp("so2", duration=1.0, intervals=3, controls=["omega"], stage_cost=["u"], bounds=1.0)
+    for call in (
+        lambda: lc.certificate(**certified, seed=bad),
+        lambda: estimate.samples(3, seed=bad),
+        lambda: problem.solve(seed=bad),
+        lambda: lc.mpc(problem).simulate(steps=2, seed=bad),
+    ):
+        with pytest.raises(LieCodegenError, match="seed is an integer from 0"):
+            call()
+
+
+def test_inputs_too_large_for_any_step_are_refused_at_once() -> None:
+    with pytest.raises(lc.errors.ComputationError, match="make eps or u smaller"):
+        hostile.alarmed(5.0, lambda: lc.order_check("so3", [1e300, 1e300, 1e300]))

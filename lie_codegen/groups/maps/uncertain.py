@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError, SpreadWarning
+from lie_codegen.exact.counts import seeded
 from lie_codegen.groups.build import build
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
@@ -133,7 +134,7 @@ class Uncertain(Saved):
         Raises:
             ArgumentError: a count or a seed that is negative or no integer.
         """
-        rng = np.random.default_rng(seed)
+        rng = seeded(seed, f"samples({self.group.name})")
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0))
         xi = self.mean_shift + rng.normal(size=(count, self.group.dim)) @ root.T

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError, ShapeError
-from lie_codegen.exact.counts import count_between
+from lie_codegen.exact.counts import count_between, seeded
 from lie_codegen.flow.elements import group_element
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
 from lie_codegen.steering.ocp.machine import loop_machine
@@ -104,7 +104,7 @@ def run_loop(
     count_between(steps, 1, 100_000_000, f"{where}: steps")
     count_between(delay, 0, 100_000, f"{where}: delay")
     count_between(substeps, 1, 1_000_000, f"{where}: substeps")
-    rng = np.random.default_rng(seed)
+    rng = seeded(seed, where)
     machine, h, free = loop_machine(data), controller.sample, data.free_duration is not None
     told = {name: value for name, value in values.items() if name in data.parameters.names}
     first = {name: values.get(name, np.zeros(shape)) for name, shape in data.states.shapes}

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.door import guard_methods
 from lie_codegen.errors import InputError
-from lie_codegen.exact.counts import count_between
+from lie_codegen.exact.counts import count_between, whole_seed
 from lie_codegen.flow.elements import group_element
 from lie_codegen.runtime.patience import shows_progress
 from lie_codegen.steering.ocp.elements import pack_element, unpack_elements
@@ -100,7 +100,7 @@ class OptimalControlProblem:
             if not (isinstance(value, int | float | np.number) and 0 <= value < np.inf):
                 raise InputError(f"{where}: {what} must be a number of at least 0, got {value!r}")
         free = self.data.free_duration
-        options = Options(count, seed, threads, tolerance, allowed, iterations, curvature)
+        options = Options(count, whole_seed(seed, where), threads, tolerance, allowed, iterations, curvature)
         if free is None:
             return self._best(*self.start(X0, values, where), guess, options, where)
         first = guess.duration if isinstance(guess, OptimalPlan) else float(np.sqrt(free[0] * free[1]))

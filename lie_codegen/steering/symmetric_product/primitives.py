@@ -15,6 +15,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringError
+from lie_codegen.exact.counts import seeded
 from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.flow.logarithm import matrix_log
 from lie_codegen.mechanics.virtual_actuation import VirtualActuation
@@ -61,7 +62,7 @@ def primitives(body: VirtualActuation, target: Array, duration: float, seed: int
         SteeringError: no word of decoupling fields was found to reach the target.
     """
     best: tuple[float, Primitives] | None = None
-    rng = np.random.default_rng(seed)
+    rng = seeded(seed, "primitives")
     for length in (body.group.dim, body.group.dim + 2):
         for word in _words(body.decoupling, length):
             for _ in range(_STARTS):
