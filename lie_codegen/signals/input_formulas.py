@@ -231,5 +231,13 @@ def series_through(values: Any) -> tuple[Array, Array, Array]:
 
 
 def rows_of(table: Any) -> list[list[Any]]:
-    """The rows of an array, a SymPy matrix or nested sequences."""
-    return table.tolist() if isinstance(table, np.ndarray | sp.MatrixBase) else [list(row) for row in table]
+    """The rows of an array, a SymPy matrix or nested sequences.
+
+    Raises:
+        TypeError: what is no sequence of sequences; a text is none, whose letters are no entries.
+    """
+    if isinstance(table, np.ndarray | sp.MatrixBase):
+        return list(table.tolist())
+    if isinstance(table, str) or any(isinstance(row, str) for row in table):
+        raise TypeError("texts are no rows")
+    return [list(row) for row in table]

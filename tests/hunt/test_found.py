@@ -250,3 +250,11 @@ def test_seeds_are_whole_numbers(seed: str) -> None:
 def test_inputs_too_large_for_any_step_are_refused_at_once() -> None:
     with pytest.raises(lc.errors.ComputationError, match="make eps or u smaller"):
         hostile.alarmed(5.0, lambda: lc.order_check("so3", [1e300, 1e300, 1e300]))
+
+
+@pytest.mark.parametrize("text", ["9" * 20_000, ["9" * 20_000], "12"])
+def test_a_text_is_no_row_of_coefficients(text: Any) -> None:
+    with pytest.raises(lc.errors.ShapeError, match="rows of n coefficients"):
+        hostile.alarmed(5.0, lambda: lc.PeriodicInput.from_fourier(cosines=text))
+    with pytest.raises(lc.errors.ShapeError, match="rows of n coefficients"):
+        hostile.alarmed(5.0, lambda: lc.PeriodicInput.from_fourier(sines=text))
