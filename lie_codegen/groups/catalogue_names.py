@@ -88,10 +88,18 @@ def group_path(name_or_path: str | Path) -> Path:
 
 @cache
 def _standard_input() -> bytes:
-    """The group file that comes on standard input, which can be read once."""
+    """The group file that comes on standard input, which can be read once.
+
+    Raises:
+        GroupFileError: the process has none.
+    """
     import sys
 
-    return sys.stdin.buffer.read()
+    if sys.stdin is None:
+        raise GroupFileError("-: there is no standard input to read a group file from; give the path of one")
+    # a notebook or a test may have put a stream of text in its place
+    source = getattr(sys.stdin, "buffer", None)
+    return bytes(source.read()) if source is not None else sys.stdin.read().encode()
 
 
 @cache

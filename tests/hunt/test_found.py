@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -258,3 +260,21 @@ def test_a_text_is_no_row_of_coefficients(text: Any) -> None:
         hostile.alarmed(5.0, lambda: lc.PeriodicInput.from_fourier(cosines=text))
     with pytest.raises(lc.errors.ShapeError, match="rows of n coefficients"):
         hostile.alarmed(5.0, lambda: lc.PeriodicInput.from_fourier(sines=text))
+
+
+def test_a_group_file_comes_from_a_stream_of_text_too() -> None:
+    text = 'name = "plane"\nlabels = ["x", "y"]\nbrackets = []\n'
+    code = f"""
+import io, sys
+import lie_codegen as lc
+sys.stdin = io.StringIO({text!r})
+try:
+    print(lc.group("-"))
+except lc.errors.LieCodegenError as error:
+    print("ours", type(error).__name__)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "ours GroupFileError" in done.stdout, done.stderr  # read, and found to lack its brackets
+    absent = code.replace(f"io.StringIO({text!r})", "None")
+    done = subprocess.run([sys.executable, "-c", absent], capture_output=True, text=True, check=False)
+    assert "ours GroupFileError" in done.stdout, done.stderr
