@@ -12,6 +12,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
+from lie_codegen.exact.counts import whole_seed
 from lie_codegen.runtime.digests import package_digest
 from lie_codegen.studies.distributions import Choice, Grid
 from lie_codegen.studies.driver import Job, drive, pilot
@@ -69,8 +70,7 @@ def study(
     """
     run, inputs = as_run(what, reduce), Space(space)
     count = _samples(n, inputs, store)
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**64:
-        raise InputError(f"study: seed is an integer from 0 to 2^64 - 1, given {seed!r}")
+    whole_seed(seed, "study")
     if until is not None and not isinstance(until, Quantile):
         raise InputError(f"study: until is a lc.studies.Quantile, given {until!r:.60}")
     engine, remote = engine_of(on)

@@ -8,19 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.stats import unitary_group
+from transmon import ANHARMONIC, HX, HY, velocity
 
 import lie_codegen as lc
-
-LOWER = np.diag([1, np.sqrt(2)], 1)
-HX, HY = (LOWER + LOWER.T) / 2, 1j * (LOWER.T - LOWER) / 2
-ANHARMONIC = np.diag([0, 0, -1.9])
-
-
-def velocity(H: np.ndarray) -> np.ndarray:
-    """Of -i H on SU(3), by the Gell-Mann basis: traces of products."""
-    basis = lc.group("su3").basis
-    gram = np.real(np.einsum("iab,jba->ij", basis, basis))
-    return np.linalg.solve(gram, np.real(np.einsum("iab,ba->i", basis, -1j * H)))
 
 
 def played(plan: lc.Plan) -> np.ndarray:

@@ -9,21 +9,11 @@ import pytest
 import sympy as sp
 from scipy.linalg import expm, logm
 from scipy.stats import unitary_group
+from transmon import ANHARMONIC, HX, HY, velocity
 
 import lie_codegen as lc
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.steering.ocp.goal_terms import away, goal_terms
-
-LOWER = np.diag([1, np.sqrt(2)], 1)
-HX, HY = (LOWER + LOWER.T) / 2, 1j * (LOWER.T - LOWER) / 2
-ANHARMONIC = np.diag([0, 0, -1.9])
-
-
-def velocity(H: np.ndarray) -> np.ndarray:
-    """Of -i H on SU(3), by the Gell-Mann basis: traces of products."""
-    basis = lc.group("su3").basis
-    gram = np.real(np.einsum("iab,jba->ij", basis, basis))
-    return np.linalg.solve(gram, np.real(np.einsum("iab,ba->i", basis, -1j * H)))
 
 
 def played(group: lc.MatrixGroup, plan: lc.Plan, drift: np.ndarray, N: int) -> np.ndarray:

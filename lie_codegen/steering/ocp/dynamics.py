@@ -90,16 +90,16 @@ def _columns(
     if inputs is not None:
         raise InputError(f"{where}: controls= names its input u itself; give inputs= with velocity= or allocation=")
     chosen = [controls] if isinstance(controls, str | int) else list(controls)
-    places = [group.algebra.index(each) for each in chosen if isinstance(each, str) or np.ndim(each) == 0]
-    if len(set(places)) != len(places) or not chosen:
-        raise InputError(f"{where}: controls {chosen} are none or repeat one")
     eye = np.eye(group.dim)
-    rows = [
-        eye[group.algebra.index(each)]
-        if isinstance(each, str) or np.ndim(each) == 0
-        else _array(each, (group.dim,), "a control", where)
-        for each in chosen
-    ]
+    rows, places = [], []
+    for each in chosen:
+        if isinstance(each, str) or np.ndim(each) == 0:
+            places.append(group.algebra.index(each))
+            rows.append(eye[places[-1]])
+        else:
+            rows.append(_array(each, (group.dim,), "a control", where))
+    if len(set(places)) != len(places) or not rows:
+        raise InputError(f"{where}: controls {chosen} are none or repeat one")
     return np.array(rows).T
 
 
