@@ -1,8 +1,8 @@
 /*
- * X' = X hat(u(t)) by Magnus steps of order 4, 6 or 8, eight at once.
+ * X' = X hat(u(t)) by Magnus steps of order 4, 6 or 8, as many at once as magnus_lanes.h has lanes.
  *
- * The equation is linear in X, so steps do not wait for each other. One trajectory is cut into eight runs of steps, a lane
- * each, every run from the identity; their products are multiplied at the end. Many trajectories go eight at a time,
+ * The equation is linear in X, so steps do not wait for each other. One trajectory is cut into as many runs of steps, a lane
+ * each, every run from the identity; their products are multiplied at the end. Many trajectories go side by side,
  * a lane each. A step is X <- X + X (exp(Omega) - 1): the increment is added, since 1 + (cos - 1) would be rounded the
  * same way in every step. Memory does not grow with the number of steps; everything is given, nothing is kept.
  *
@@ -24,11 +24,11 @@ static inline V middle_of(V knot, V inside, V h, V *low)
     return sum;
 }
 
-/* Doubles that the workspace needs, with 8 more for its alignment. */
+/* Doubles that the workspace needs, its alignment included. */
 EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots);
 EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots)
 {
-    return LANES * (rates * (2 * DIM + 6 + ORDERS) + (terms + 2) * DIM + 1) + slots * (STATE + 1);
+    return LANES * (source_vectors(rates, terms) + 1) + slots * (STATE + 1);
 }
 
 /*

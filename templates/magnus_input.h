@@ -99,14 +99,15 @@ static void enter(const Input *u, const Grid *grid, Source *source, int lane, pt
 }
 
 #if TABLES
-/* Tables of values at the nodes: the generators of eight steps, `table` pointing at each lane's own, `apart` from node to node. */
+/* Tables of values at the nodes: the generators of a step of every lane, `table` pointing at each lane's own, `apart` from node to node. */
 static __attribute__((noinline)) void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V a[ORDERS][DIM])
 {
     for (ptrdiff_t g = 0; g < u->nodes; ++g) {
         EACH(i, DIM) {
             const ptrdiff_t at = g * apart + i;
-            const V value = h * (V){table[0][at], table[1][at], table[2][at], table[3][at],
-                table[4][at], table[5][at], table[6][at], table[7][at]};
+#define THERE(l) table[l][at]
+            const V value = h * (V)LANEWISE(THERE);
+#undef THERE
             EACH(j, ORDERS) { a[j][i] += u->projection[j * u->nodes + g] * value; }
         }
     }
@@ -151,7 +152,7 @@ static __attribute__((noinline)) void from_series(const Input *u, const Source *
     }
 }
 
-/* a_1 .. a_4 of eight steps whose middles are middle + low. */
+/* a_1 .. a_4 of a step of every lane, whose middles are middle + low. */
 static inline void generators(const Input *u, Source *source, V middle, V low, V h, const double *const *table,
     V a[ORDERS][DIM])
 {

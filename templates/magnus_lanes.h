@@ -1,4 +1,7 @@
-/* Eight doubles at once, whatever the processor has: the compiler makes two or four of it where its vectors are shorter. */
+/*
+ * A vector of doubles, or of floats where SINGLE is 1; u and time are given in doubles. How many lanes it has is chosen here, when this is
+ * compiled: what the processor's registers hold. Wider vectors than that go through memory, narrower ones leave half idle.
+ */
 #ifndef MAGNUS_LANES_H
 #define MAGNUS_LANES_H
 
@@ -10,55 +13,112 @@
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
-enum { LANES = 8, ORDERS = 4, MOST_NODES = 12, AFRESH = 64 };
-#define TABLES 1
+#ifndef SINGLE
+#define SINGLE 0
+#endif
+#ifndef LANES
+#if defined(__AVX512F__)
+#define LANES (8 << SINGLE)
+#elif defined(__AVX2__) && defined(__FMA__)
+#define LANES (4 << SINGLE)
+#else
+#define LANES (2 << SINGLE)
+#endif
+#endif
 
-typedef double V __attribute__((vector_size(8 * LANES)));
-typedef long long I __attribute__((vector_size(8 * LANES)));
+/* One entry for each lane, in braces: each(0), each(1), ... */
+#define TWO(each, l) each(l), each(l + 1)
+#define FOUR(each, l) TWO(each, l), TWO(each, l + 2)
+#define EIGHT(each, l) FOUR(each, l), FOUR(each, l + 4)
+#if LANES == 2
+#define LANEWISE(each) {TWO(each, 0)}
+#elif LANES == 4
+#define LANEWISE(each) {FOUR(each, 0)}
+#elif LANES == 8
+#define LANEWISE(each) {EIGHT(each, 0)}
+#elif LANES == 16
+#define LANEWISE(each) {EIGHT(each, 0), EIGHT(each, 8)}
+#else
+#error "LANES is 2, 4, 8 or 16"
+#endif
+
+#define TABLES (!SINGLE)
+#if SINGLE
+/* Angles are taken afresh often: every turn rounds them by 1e-7. */
+enum { ORDERS = 4, AFRESH = 8 };
+typedef float Real;
+typedef int Bits;
+
+/* Degrees of the series of exp in magnus_move.h: what they leave out is some 1e-8 for each unit of |Omega|. */
+#define POWERS(size) ((size) <= 0.13f ? 1 : (size) <= 0.71f ? 2 : 3)
+#define DEGREE(size) ((size) <= 0.24f ? 6 : (size) <= 0.71f ? 9 : 12)
+#else
+enum { ORDERS = 4, MOST_NODES = 12, AFRESH = 64 };
+typedef double Real;
+typedef long long Bits;
 
 /* Degrees of the series of exp in magnus_move.h: what they leave out is some 1e-17 for each unit of |Omega|. */
 #define POWERS(size) ((size) <= 0.0044 ? 1 : (size) <= 0.09 ? 2 : (size) <= 0.36 ? 3 : (size) <= 0.85 ? 4 : 5)
 #define DEGREE(size) ((size) <= 0.006 ? 6 : (size) <= 0.07 ? 9 : (size) <= 0.24 ? 12 : (size) <= 0.56 ? 15 : 18)
+#endif
+
+typedef Real V __attribute__((vector_size(LANES * sizeof(Real))));
+typedef Bits I __attribute__((vector_size(LANES * sizeof(Real))));
 
 #define EACH(k, n) for (int k = 0; k < (n); ++k)
 
-static inline V splat(double x)
+static inline V splat(Real x)
 {
-    const V v = {x, x, x, x, x, x, x, x};
-    return v;
+#define SAME(l) x
+    return (V)LANEWISE(SAME);
+#undef SAME
 }
 
-static double largest(V x)
+static Real largest(V x)
 {
-    double most = x[0];
+    Real most = x[0];
     for (int l = 1; l < LANES; ++l) {
         most = x[l] > most || x[l] != x[l] ? x[l] : most; /* a NaN shows */
     }
     return most;
 }
 
-/* a b + c, rounded once. */
+/* a b + c, rounded once: one instruction where the processor has it, else a call for each lane. */
 static inline V fused(V a, V b, V c)
 {
     V r;
+#if SINGLE
+    EACH(l, LANES) { r[l] = __builtin_fmaf(a[l], b[l], c[l]); }
+#else
     EACH(l, LANES) { r[l] = __builtin_fma(a[l], b[l], c[l]); }
+#endif
     return r;
 }
 
-/* cos and sin of p + e, e small: p less the nearest multiple of pi/2, in three pieces, then Taylor to 1e-18. */
+/* cos and sin of p + e, e small: p less the nearest multiple of pi/2, in three pieces, then Taylor to 1e-18, of floats to 1e-9. */
 static inline void cos_sin(V p, V e, V *c, V *s)
 {
-    const double magic = 6755399441055744.0;
-    const V n = (p * 0.6366197723675814 + magic) - magic;
+    enum { TOP = 8 * (int)sizeof(Real) - 2 }; /* moves 2 to the sign */
+#if SINGLE
+    const Real magic = 12582912.0f, quarters = 0.63661977f, turn = 1.570796251296997f, rest = 7.549789415861596e-8f, last = 5.390302529957765e-15f;
+#else
+    const Real magic = 6755399441055744.0, quarters = 0.6366197723675814, turn = 1.5707963267948966, rest = 6.123233995736766e-17,
+        last = -1.4973849048591833e-33;
+#endif
+    const V n = (p * quarters + magic) - magic;
     const I k = (I)(n + magic);
-    const V r = (fused(-n, splat(6.123233995736766e-17), fused(-n, splat(1.5707963267948966), p))
-        - n * -1.4973849048591833e-33) + e;
-    const V z = r * r;
-    const V sine = r + r * z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800
-        + z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0 + z * (1.0 / 355687428096000.0))))))));
-    const V cosine = 1.0 + z * (-0.5 + z * (1.0 / 24 + z * (-1.0 / 720 + z * (1.0 / 40320 + z * (-1.0 / 3628800
-        + z * (1.0 / 479001600 + z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0))))))));
-    const I odd = -(k & 1), minus_sine = (k & 2) << 62, minus_cosine = ((k + 1) & 2) << 62;
+    const V r = (fused(-n, splat(rest), fused(-n, splat(turn), p)) - n * last) + e, z = r * r;
+#if SINGLE
+    const V sine_tail = splat(1.0f / 362880), cosine_tail = splat(-1.0f / 3628800);
+#else
+    const V sine_tail = 1.0 / 362880 + z * (-1.0 / 39916800 + z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0
+        + z * (1.0 / 355687428096000.0))));
+    const V cosine_tail = -1.0 / 3628800 + z * (1.0 / 479001600 + z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0)));
+#endif
+    const Real one = 1;
+    const V sine = r + r * z * (-one / 6 + z * (one / 120 + z * (-one / 5040 + z * sine_tail)));
+    const V cosine = one + z * (-one / 2 + z * (one / 24 + z * (-one / 720 + z * (one / 40320 + z * cosine_tail))));
+    const I odd = -(k & 1), minus_sine = (k & 2) << TOP, minus_cosine = ((k + 1) & 2) << TOP;
     *s = (V)(((odd & (I)cosine) | (~odd & (I)sine)) ^ minus_sine);
     *c = (V)(((odd & (I)sine) | (~odd & (I)cosine)) ^ minus_cosine);
 }

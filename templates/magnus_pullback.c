@@ -163,6 +163,13 @@ static void exponent_of(const Input *u, const double *lengths, const ptrdiff_t *
     exponent8((const V (*)[WORK])a, st, omega);
 }
 
+/* In how many runs the steps are cut. */
+EXPORT ptrdiff_t magnus_lanes(void);
+EXPORT ptrdiff_t magnus_lanes(void)
+{
+    return LANES;
+}
+
 /* X: (LANES, SIZE, SIZE) the product of the steps of each lane, all steps in LANES runs. */
 EXPORT void magnus_lane_products(const Input *u, const double *lengths, ptrdiff_t steps, double *X);
 EXPORT void magnus_lane_products(const Input *u, const double *lengths, ptrdiff_t steps, double *X)

@@ -1,16 +1,18 @@
 /*
- * magnus_many of magnus.c on sixteen lanes of floats, for screening: u and time in doubles, steps and X in floats. Its headers are those of
+ * magnus_many of magnus.c on lanes of floats, for screening: u and time in doubles, steps and X in floats. Its headers are those of
  * magnus.c written in floats, except what Python gives.
  */
+#define SINGLE 1
 #define HALVES 1
 #include "magnus_words.h"
 
 #include "magnus_step.h"
 
+/* Floats that the workspace needs, its alignment included. */
 EXPORT ptrdiff_t magnus_single_work(ptrdiff_t rates, ptrdiff_t terms);
 EXPORT ptrdiff_t magnus_single_work(ptrdiff_t rates, ptrdiff_t terms)
 {
-    return LANES * (rates * (2 * DIM + 6 + ORDERS) + (terms + 2) * DIM + 1);
+    return LANES * (source_vectors(rates, terms) + 1);
 }
 
 /* As magnus_many; X0 and X in floats. Time is known to twice their precision. */

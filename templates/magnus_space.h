@@ -7,6 +7,12 @@ static V *aligned(double *space)
     return (V *)(((size_t)space + sizeof(V) - 1) / sizeof(V) * sizeof(V));
 }
 
+/* Vectors that lay_out takes. */
+static ptrdiff_t source_vectors(ptrdiff_t rates, ptrdiff_t terms)
+{
+    return rates * (2 * DIM + 6 + ORDERS) + (terms + 2) * DIM;
+}
+
 static void lay_out(const Input *u, V *space, Source *source)
 {
     source->cosines = space;

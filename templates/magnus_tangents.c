@@ -79,11 +79,11 @@ static inline void carry(const V *omega, const V *domega, V *eta)
     }
 }
 
-/* Doubles of the workspace of magnus_tangents, with 8 more for its alignment. */
+/* Doubles of the workspace of magnus_tangents, its alignment included. */
 EXPORT ptrdiff_t magnus_tangents_work(ptrdiff_t tangents);
 EXPORT ptrdiff_t magnus_tangents_work(ptrdiff_t tangents)
 {
-    return LANES * (WORK * tangents + 2 * DIM + 1);
+    return LANES * (source_vectors(0, 0) + WORK * tangents + 1);
 }
 
 /*
@@ -93,7 +93,7 @@ EXPORT ptrdiff_t magnus_tangents_work(ptrdiff_t tangents)
 EXPORT void magnus_tangents(const Input *u, double length, ptrdiff_t steps, double *space, double *X, double *dX);
 EXPORT void magnus_tangents(const Input *u, double length, ptrdiff_t steps, double *space, double *X, double *dX)
 {
-    V *work = aligned(space), *eta = work + 2 * DIM, state[STATE];
+    V *work = aligned(space), *eta = work + source_vectors(0, 0), state[STATE];
     Source source;
     Input plain = *u;
     const V h = splat(length / (double)steps);

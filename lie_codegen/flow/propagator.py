@@ -195,7 +195,7 @@ class Propagator(Saved):
         return Propagation(run.X[0], run.error_estimate, run.steps, length, named, self, finest)
 
     def batch(self, *, threads: int = 1, precision: str = "double", **parameters: ArrayLike) -> PropagationBatch:
-        """X(T; p) where any of the parameters are (N,) arrays and the others numbers, eight at a time on lanes.
+        """X(T; p) where any of the parameters are (N,) arrays and the others numbers, side by side on lanes.
 
         Args:
             threads: that share the members; the result does not depend on it.

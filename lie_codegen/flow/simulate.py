@@ -67,8 +67,8 @@ def simulate(
     """The flow X' = X hat(eps u(t)) from X(t[0]) = X0, at the times t; one, or N trajectories at once.
 
     X(t + h) = X(t) exp(Omega), Omega the Magnus series to order 8 or 6: Blanes, Casas and Ros, BIT 40 (2000) 434, in the
-    left-invariant form (every bracket with the other sign). One trajectory is cut into eight runs of steps that go
-    side by side; many go eight at a time.
+    left-invariant form (every bracket with the other sign). One trajectory is cut into runs of steps that go
+    side by side, as many as a vector of the processor has doubles; many trajectories go so too.
 
     Args:
         group: the group; or a plan alone, as in `lc.simulate(plan)`.
@@ -92,7 +92,7 @@ def simulate(
             which order "auto" takes and how finely a function u is read, atol is refused. For the Magnus methods.
         events: `lc.Event`s to be found along one trajectory.
         threads: over which N trajectories, or the steps of one, are shared out.
-        precision: "single" for screening N trajectories, sixteen at a time and twice as fast, to 1e-6 at best: u and t are doubles, steps
+        precision: "single" for screening N trajectories, twice as many at a time and twice as fast, to 1e-6 at best: u and t are doubles, steps
             are floats, X comes in doubles. Rounding costs 6e-8 for each unit of the integral of |u|; `run.error_estimate` says it.
 
     Raises:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,6 @@ _HEADERS = tuple(f"magnus_{name}.h" for name in ("words", "lanes", "given", "inp
 _MORE = {"magnus": ("magnus_step.h", "magnus_solve.h"), "magnus_single": ("magnus_step.h",)}
 #: What Python gives stays in doubles where the lanes hold floats; the rest is written in floats.
 _IN_DOUBLES = ("magnus_single.c", "magnus_given.h", "magnus_lanes.h")
-_LANES, _SINGLE_LANES = 8, 16
 #: Up to this dimension loops over coordinates are worth unrolling (a third faster); beyond, it only takes longer to compile.
 _SMALL = 8
 
@@ -70,7 +70,7 @@ class MagnusLibrary:
 
     def work(self, rates: int, terms: int, slots: int) -> int:
         """Doubles of the workspace of one trajectory, with its alignment."""
-        return int(self._work(rates, terms, slots)) + _LANES
+        return int(self._work(rates, terms, slots))
 
     @cached_property
     def _derivatives(self) -> ctypes.CDLL:
@@ -104,19 +104,20 @@ class MagnusLibrary:
             raise CompileError(f"{self.group.name}: the reverse derivatives of its Magnus steps do not compile")
         for each in (library.magnus_lane_products, library.magnus_pullback):
             each.restype = None
+        library.magnus_lanes.restype, library.magnus_lanes.argtypes = size, ()
         library.magnus_lane_products.argtypes = (pointer, pointer, size, pointer)
         library.magnus_pullback.argtypes = (pointer, pointer, size, pointer, pointer)
         return library
 
     def lane_products(self, values: Array, lengths: Array, projection: Array) -> Array:
-        """(8, d, d) the products of the steps in eight runs, u given by its (steps, nodes, n) values at nodes."""
+        """(lanes, d, d) the products of the steps in as many runs, u given by its (steps, nodes, n) values at nodes."""
         u, d = _table_input(values, projection), self.group.degree
-        X = np.empty((_LANES, d, d), complex if self.group.is_complex else float)
+        X = np.empty((self._reverse.magnus_lanes(), d, d), complex if self.group.is_complex else float)
         self._reverse.magnus_lane_products(ctypes.addressof(u), lengths.ctypes.data, len(lengths), X.ctypes.data)
         return X
 
     def pullback(self, values: Array, lengths: Array, projection: Array, covectors: Array) -> Array:
-        """(steps, nodes, n): what the (8, d, d) covectors after the runs of `lane_products` are on the values."""
+        """(steps, nodes, n): what the (lanes, d, d) covectors after the runs of `lane_products` are on the values."""
         u, slopes = _table_input(values, projection), np.empty_like(values)
         self._reverse.magnus_pullback(
             ctypes.addressof(u), lengths.ctypes.data, len(lengths), covectors.ctypes.data, slopes.ctypes.data
@@ -130,7 +131,7 @@ class MagnusLibrary:
         """
         u, grid = read_by(drive, 0), grid_of(steps)
         X, end = np.zeros((steps.slots, *X0.shape), X0.dtype), np.empty_like(X0)
-        space = np.empty(self.work(drive.rates.shape[-1], drive.terms, steps.slots))
+        space = _space(self.work(drive.rates.shape[-1], drive.terms, steps.slots))
         self._one(
             ctypes.addressof(u), ctypes.addressof(grid), order, first, last, X0.ctypes.data, steps.slots,
             space.ctypes.data, X.ctypes.data, end.ctypes.data,
@@ -142,7 +143,7 @@ class MagnusLibrary:
         u, grid = read_by(drive, first), grid_of(steps)
         stride = X0[0].size * (2 if X0.dtype.kind == "c" else 1) if X0.ndim == 3 else 0
         X = np.zeros((last - first, steps.slots, *X0.shape[-2:]), X0.dtype)
-        space = np.empty(self.work(drive.rates.shape[-1], drive.terms, 0))
+        space = _space(self.work(drive.rates.shape[-1], drive.terms, 0))
         self._many(
             ctypes.addressof(u), ctypes.addressof(grid), order, last - first, X0.ctypes.data + 8 * stride * first, stride,
             steps.slots, space.ctypes.data, X.ctypes.data,
@@ -150,12 +151,11 @@ class MagnusLibrary:
         return X
 
     def many_single(self, drive: Drive, steps: Steps, order: int, X0: Array, first: int, last: int) -> Array:
-        """As `many`, sixteen at a time in single precision; X0 and the result are float32 or complex64."""
+        """As `many`, in single precision; X0 and the result are float32 or complex64."""
         u, grid = read_by(drive, first), grid_of(steps)
         stride = X0[0].nbytes // 4 if X0.ndim == 3 else 0
         X = np.zeros((last - first, steps.slots, *X0.shape[-2:]), X0.dtype)
-        floats = int(self._single.magnus_single_work(drive.rates.shape[-1], drive.terms)) + _SINGLE_LANES
-        space = np.empty(floats, np.float32)
+        space = _space(self._single.magnus_single_work(drive.rates.shape[-1], drive.terms), np.float32)
         self._single.magnus_many_single(
             ctypes.addressof(u), ctypes.addressof(grid), order, last - first, X0.ctypes.data + 4 * stride * first, stride,
             steps.slots, space.ctypes.data, X.ctypes.data,
@@ -179,11 +179,16 @@ class MagnusLibrary:
             tangent=tangents.ctypes.data, factor=factor.ctypes.data,
         )  # fmt: skip
         X, dX = np.empty((d, d), kind), np.empty((m, d, d), kind)
-        space = np.empty(self._derivatives.magnus_tangents_work(m) + _LANES)
+        space = _space(self._derivatives.magnus_tangents_work(m))
         self._derivatives.magnus_tangents(
             ctypes.addressof(u), length, count, space.ctypes.data, X.ctypes.data, dX.ctypes.data
         )
         return X, dX
+
+
+def _space(size: int, kind: type[np.floating[Any]] = np.float64) -> Array:
+    """The workspace of one call; compiled code says its size, by the width of its vectors."""
+    return np.empty(size, kind)
 
 
 def _table_input(values: Array, projection: Array) -> Input:
@@ -229,28 +234,27 @@ def magnus_library(group: MatrixGroup) -> MagnusLibrary | None:
     return None if library is None else MagnusLibrary(group, library)
 
 
+def magnus_files(group: MatrixGroup, stem: str) -> dict[str, str]:
+    """File name -> C text of a library of the group: magnus, magnus_single, magnus_tangents or magnus_pullback."""
+    from lie_codegen.codegen.opcodes import in_single
+    from lie_codegen.codegen.templates import render
+    from lie_codegen.flow.magnus.group_view import group_view, reverse_view
+
+    view = (reverse_view if stem == "magnus_pullback" else group_view)(group)
+    names = (f"{stem}.c", *_HEADERS, *_MORE.get(stem, ()))
+    texts = {name: (template_folder() / name).read_text(encoding="utf-8") for name in names}
+    texts["magnus_group.h"] = render("magnus_group.h.jinja", group=view)
+    if stem == "magnus_single":
+        return {name: text if name in _IN_DOUBLES else in_single(text) for name, text in texts.items()}
+    return texts
+
+
 def _opened(group: MatrixGroup, stem: str) -> ctypes.CDLL | None:
     """A C file with the headers of the Magnus steps and the one made for the group, compiled."""
 
-    def files() -> dict[str, str]:
-        from lie_codegen.codegen.opcodes import in_single
-        from lie_codegen.codegen.templates import render
-        from lie_codegen.flow.magnus.group_view import group_view, reverse_view
-
-        view = (reverse_view if stem == "magnus_pullback" else group_view)(group)
-        names = (f"{stem}.c", *_HEADERS, *_MORE.get(stem, ()))
-        source = {name: name for name in names}
-        if stem == "magnus_single":
-            source["magnus_lanes.h"] = "magnus_lanes_single.h"
-        texts = {name: (template_folder() / file).read_text(encoding="utf-8") for name, file in source.items()}
-        texts["magnus_group.h"] = render("magnus_group.h.jinja", group=view)
-        if stem == "magnus_single":
-            return {name: text if name in _IN_DOUBLES else in_single(text) for name, text in texts.items()}
-        return texts
-
     try:
         path = build_source(
-            files, f"{stem}.c", namespace=f"{group.name}_{stem}", definition=f"{stem}\n{group.definition_text}",
+            lambda: magnus_files(group, stem), f"{stem}.c", namespace=f"{group.name}_{stem}", definition=f"{stem}\n{group.definition_text}",
             more_flags=("-O3",) if group.dim <= _SMALL else (),
         )  # fmt: skip
     except CompileError:
