@@ -43,7 +43,7 @@ EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrd
     V *work = aligned(space);
     Source source;
     lay_out(u, work, &source);
-    double *kept = (double *)(source.series + u->terms * DIM), *lane_of = kept + slots * STATE;
+    double *kept = space + LANES * (source_vectors(u->rates, u->terms) + 1), *lane_of = kept + slots * STATE;
     ptrdiff_t span[LANES], inside[LANES], left[LANES], at[LANES];
     V state[STATE], most = splat(0.0), knot = splat(0.0), h = splat(0.0), place = splat(0.0);
     double prefix[LANES + 1][FULL];
@@ -71,6 +71,7 @@ EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrd
             enter(u, grid, &source, l, low, h[l], 0);
         }
     }
+    find_driven(u, &source);
     for (;;) {
         ptrdiff_t count = 0;
         EACH(l, LANES) {
@@ -160,6 +161,7 @@ EXPORT double magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptr
             get(X0 + who * X0_stride, start[l]);
             table[l] = u->table ? u->table + who * u->table_stride : NULL;
         }
+        find_driven(u, &source);
         for (ptrdiff_t s = 0; s < grid->spans; ++s) {
             const double h = (grid->knots[s + 1] - grid->knots[s]) / (double)grid->parts[s];
             EACH(l, LANES) { enter(u, grid, &source, l, s, h, row + l < count ? row + l : count - 1); }

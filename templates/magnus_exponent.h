@@ -26,7 +26,10 @@ static inline void entry(const V *x, const V *y, V *z, int i, int j)
 #endif
 }
 
-#if MATRIX > 32 && PARTS == 2
+/* Complex matrices in blocks of 2 x 2; of 4 x 4 single entries where a vector has eight doubles, blocks where it has fewer (measured). */
+#define BLOCKS (PARTS == 2 && MATRIX >= (LANES == 8 << SINGLE ? 33 : 32))
+
+#if BLOCKS
 /* Four entries at once, two rows by two columns: what is loaded is used twice, and eight sums do not wait for each other. */
 static inline void four_entries(const V *x, const V *y, int i, int j, V block[8])
 {
@@ -34,8 +37,16 @@ static inline void four_entries(const V *x, const V *y, int i, int j, V block[8]
     V re00 = splat(0.0), re01 = re00, re10 = re00, re11 = re00, im00 = re00, im01 = re00, im10 = re00, im11 = re00;
     for (int m = 0; m < ROWS; ++m) {
         const V *const u = y + m * SIZE + j;
-        const V a = p[m], b = q[m], ai = p[MATRIX / 2 + m], bi = q[MATRIX / 2 + m];
-        const V c = u[0], d = u[1], ci = u[MATRIX / 2], di = u[MATRIX / 2 + 1];
+        V a = p[m], b = q[m], ai = p[MATRIX / 2 + m], bi = q[MATRIX / 2 + m];
+        V c = u[0], d = u[1], ci = u[MATRIX / 2], di = u[MATRIX / 2 + 1];
+        HELD(a);
+        HELD(b);
+        HELD(ai);
+        HELD(bi);
+        HELD(c);
+        HELD(d);
+        HELD(ci);
+        HELD(di);
         re00 += a * c;
         re01 += a * d;
         re10 += b * c;
@@ -63,10 +74,18 @@ static inline void four_entries(const V *x, const V *y, int i, int j, V block[8]
     block[7] = im11;
 }
 
-/* Where an entry of such a block lies in the matrix. */
-static inline int place_of(int k, int i, int j)
+/* Such a block where its first entry lies in the matrix. */
+static inline void put_block(const V block[8], V *to)
 {
-    return (k / 4) * (MATRIX / 2) + (i + k / 2 % 2) * SIZE + j + k % 2;
+    V *const next = to + SIZE;
+    to[0] = block[0];
+    to[1] = block[1];
+    next[0] = block[2];
+    next[1] = block[3];
+    to[MATRIX / 2] = block[4];
+    to[MATRIX / 2 + 1] = block[5];
+    next[MATRIX / 2] = block[6];
+    next[MATRIX / 2 + 1] = block[7];
 }
 
 /* z = x y. */
@@ -76,7 +95,7 @@ static __attribute__((noinline)) void multiply(const V *x, const V *y, V *z)
         for (int j = 0; j + 1 < SIZE; j += 2) {
             V block[8];
             four_entries(x, y, i, j, block);
-            EACH(k, 8) { z[place_of(k, i, j)] = block[k]; }
+            put_block(block, z + i * SIZE + j);
         }
         if (SIZE % 2) {
             entry(x, y, z, i, SIZE - 1);
@@ -119,12 +138,12 @@ static inline
 #endif
 void half_product(const V *x, const V *y, V *z, double sign)
 {
-#if MATRIX > 32 && PARTS == 2
+#if BLOCKS
     for (int i = 0; i + 1 < SIZE; i += 2) {
         for (int j = i; j + 1 < SIZE; j += 2) {
             V block[8];
             four_entries(x, y, i, j, block);
-            EACH(k, 8) { z[place_of(k, i, j)] = block[k]; }
+            put_block(block, z + i * SIZE + j);
         }
     }
     if (SIZE % 2) {
@@ -167,21 +186,18 @@ static
 #endif
 void matrix_bracket(const V *x, const V *y, V *z)
 {
-#if ABOVE && MATRIX > 32 && PARTS == 2 && SIZE % 2 == 0
+#if ABOVE && BLOCKS && SIZE % 2 == 0
     for (int i = 0; i < SIZE; i += 2) {
         for (int j = i; j < SIZE; j += 2) {
-            V block[8], across[8];
+            V block[8], beyond[8], *across = block;
             four_entries(x, y, i, j, block);
             if (j > i) {
-                four_entries(x, y, j, i, across);
-            } else {
-                EACH(k, 8) { across[k] = block[k]; }
+                four_entries(x, y, j, i, across = beyond);
             }
-            EACH(k, 4) { /* entry (r, s) of the block less the conjugate of (s, r) across */
-                const int turned = k % 2 * 2 + k / 2;
-                z[place_of(k, i, j)] = block[k] - across[turned];
-                z[place_of(4 + k, i, j)] = block[4 + k] + across[4 + turned];
-            }
+            /* entry (r, s) of the block less the conjugate of (s, r) across */
+            const V difference[8] = {block[0] - across[0], block[1] - across[2], block[2] - across[1], block[3] - across[3],
+                block[4] + across[4], block[5] + across[6], block[6] + across[5], block[7] + across[7]};
+            put_block(difference, z + i * SIZE + j);
         }
     }
 #elif SKEW
@@ -209,7 +225,6 @@ void matrix_bracket(const V *x, const V *y, V *z)
 
 /* ---- the exponent: brackets have the sign of X' = X A, c(a, b) = -[a, b] ---- */
 
-/* Intermediate values that the derivative needs again. */
 /* Intermediate values that the derivative needs again. */
 enum { KEPT = WORK + APART };
 typedef struct {

@@ -13,6 +13,7 @@ typedef struct {
     ptrdiff_t age;      /* steps since the angles were taken afresh; negative: they have to be */
     V *left, *slope;    /* DIM each */
     V *series;          /* terms x DIM */
+    ptrdiff_t *driven;  /* rates x (1 + DIM): of each rate how many components have a wave in some lane, and which */
     V start, start_low, width, factor; /* of the piece, its start to twice the precision */
     double h[LANES], turned[LANES]; /* of the weights, of `turn` */
 } Source;
@@ -143,7 +144,7 @@ static __attribute__((noinline)) void from_series(const Input *u, const Source *
             now[g] = next;
         }
         EACH(i, DIM) {
-            const V c = h * source->series[k * DIM + i];
+            const V c = source->factor * h * source->series[k * DIM + i];
             a[0][i] += c * (zeroth - third * (1.0 / 12));
             a[1][i] += c * (12.0 * first - 0.15 * fourth);
             a[2][i] += c * third;
@@ -159,6 +160,7 @@ static inline void generators(const Input *u, Source *source, V middle, V low, V
     EACH(j, ORDERS) {
         EACH(i, DIM) { a[j][i] = splat(0.0); }
     }
+    const V scale = source->factor * h;
     /* Angles turn by w h from step to step; what rounding adds is thrown away every AFRESH steps. */
     source->age = source->age >= 0 && source->age < AFRESH ? source->age + 1 : 0;
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
@@ -174,9 +176,11 @@ static inline void generators(const Input *u, Source *source, V middle, V low, V
         }
         source->angle[2 * f] = c;
         source->angle[2 * f + 1] = s;
-        EACH(i, DIM) {
+        const ptrdiff_t *const driven = source->driven + f * (DIM + 1);
+        for (ptrdiff_t j = 1; j <= driven[0]; ++j) {
+            const ptrdiff_t i = driven[j];
             const V x = source->cosines[f * DIM + i], y = source->sines[f * DIM + i];
-            const V p = h * (x * c + y * s), q = h * (y * c - x * s);
+            const V p = scale * (x * c + y * s), q = scale * (y * c - x * s);
             a[0][i] += k[0] * p;
             a[1][i] += k[1] * q;
             a[2][i] += k[2] * p;
@@ -188,20 +192,17 @@ static inline void generators(const Input *u, Source *source, V middle, V low, V
     } else if (u->times) {
         const V x = ((middle - source->start) + (low - source->start_low)) / source->width, part = h / source->width;
         EACH(i, DIM) {
-            a[0][i] += h * (source->left[i] + x * source->slope[i]);
-            a[1][i] += h * part * source->slope[i];
+            a[0][i] += scale * (source->left[i] + x * source->slope[i]);
+            a[1][i] += scale * part * source->slope[i];
         }
     }
 #if TABLES
     if (u->table) {
-        from_nodes(u, table, DIM, h, a);
+        from_nodes(u, table, DIM, scale, a);
     }
 #else
     (void)table;
 #endif
-    EACH(j, ORDERS) {
-        EACH(i, DIM) { a[j][i] *= source->factor; }
-    }
 }
 
 #endif

@@ -16,14 +16,16 @@
 #ifndef SINGLE
 #define SINGLE 0
 #endif
-#ifndef LANES
+/* Doubles, or floats, of a register. */
 #if defined(__AVX512F__)
-#define LANES (8 << SINGLE)
+#define WIDTH (8 << SINGLE)
 #elif defined(__AVX2__) && defined(__FMA__)
-#define LANES (4 << SINGLE)
+#define WIDTH (4 << SINGLE)
 #else
-#define LANES (2 << SINGLE)
+#define WIDTH (2 << SINGLE)
 #endif
+#ifndef LANES
+#define LANES WIDTH
 #endif
 
 /* One entry for each lane, in braces: each(0), each(1), ... */
@@ -66,6 +68,13 @@ typedef Real V __attribute__((vector_size(LANES * sizeof(Real))));
 typedef Bits I __attribute__((vector_size(LANES * sizeof(Real))));
 
 #define EACH(k, n) for (int k = 0; k < (n); ++k)
+
+/* x stays in its register: tuned for Zen, gcc reads it from memory again for every product, and loads become the limit. */
+#if defined(__FMA__) && !defined(__clang__) && LANES <= WIDTH
+#define HELD(x) __asm__("" : "+v"(x))
+#else
+#define HELD(x) (void)(x)
+#endif
 
 static inline V splat(Real x)
 {

@@ -33,6 +33,7 @@ EXPORT void magnus_many_single(const Input *u, const Grid *grid, ptrdiff_t order
             set_waves(u, &source, l, who);
             get(X0 + who * X0_stride, start[l]);
         }
+        find_driven(u, &source);
         for (ptrdiff_t s = 0; s < grid->spans; ++s) {
             const double h = (grid->knots[s + 1] - grid->knots[s]) / (double)grid->parts[s];
             EACH(l, LANES) { enter(u, grid, &source, l, s, (float)h, row + l < count ? row + l : count - 1); }

@@ -10,7 +10,7 @@ static V *aligned(double *space)
 /* Vectors that lay_out takes. */
 static ptrdiff_t source_vectors(ptrdiff_t rates, ptrdiff_t terms)
 {
-    return rates * (2 * DIM + 6 + ORDERS) + (terms + 2) * DIM;
+    return rates * (3 * DIM + 7 + ORDERS) + (terms + 2) * DIM;
 }
 
 static void lay_out(const Input *u, V *space, Source *source)
@@ -26,6 +26,7 @@ static void lay_out(const Input *u, V *space, Source *source)
     source->age = -1;
     source->slope = source->left + DIM;
     source->series = source->slope + DIM;
+    source->driven = (ptrdiff_t *)(source->series + u->terms * DIM);
     EACH(l, LANES) { source->h[l] = -1.0; }
     source->start = source->start_low = splat(0.0);
     source->width = splat(1.0);
@@ -39,6 +40,22 @@ static void lay_out(const Input *u, V *space, Source *source)
     }
     for (ptrdiff_t k = 0; k < u->terms * DIM; ++k) {
         source->series[k] = splat(0.0);
+    }
+}
+
+/* After set_waves of every lane: mostly few components are driven, each at few rates. */
+static void find_driven(const Input *u, Source *source)
+{
+    for (ptrdiff_t f = 0; f < u->rates; ++f) {
+        ptrdiff_t *const driven = source->driven + f * (DIM + 1);
+        driven[0] = 0;
+        EACH(i, DIM) {
+            int some = 0;
+            EACH(l, LANES) { some |= source->cosines[f * DIM + i][l] != 0 || source->sines[f * DIM + i][l] != 0; }
+            if (some) {
+                driven[++driven[0]] = i;
+            }
+        }
     }
 }
 
