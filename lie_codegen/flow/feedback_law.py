@@ -16,7 +16,7 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.linear import Vector
 from lie_codegen.on_demand import sympy as sp
-from lie_codegen.runtime.formula_input import HasFormula
+from lie_codegen.runtime.formula_input import has_formula
 
 #: (ops, t, X, g) -> u; X or g is None where the feedback does not read it.
 LawBody = Callable[[Arithmetic, Scalar, Any, Any], Vector]
@@ -68,7 +68,7 @@ def as_feedback(group: MatrixGroup, u: Any) -> Feedback | None:
         if len(found) == 2:
             raise InputError(f"simulate({group.name}): a feedback reads X or the coordinates g, not both")
         return Feedback(tuple(map(str, u)), found.pop()) if found else None
-    if callable(u) and not isinstance(u, HasFormula):
+    if callable(u) and not has_formula(u):
         second = _second_argument(u)
         return None if second is None else Feedback(u, "g" if second == "g" else "X")
     return None

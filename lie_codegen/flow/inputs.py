@@ -110,7 +110,9 @@ def _of_formula(formula: FormulaInput, t: Array) -> Signal:
         return one.values(s, np.zeros_like(s), np.zeros(1))[:, 0]
 
     inside = formula.breakpoints
-    return Signal(formula.dim, evaluate, inside[(inside >= t[0]) & (inside <= t[-1])], formula)
+    if len(inside):
+        inside = inside[(inside >= t[0]) & (inside <= t[-1])]
+    return Signal(formula.dim, evaluate, inside, formula)
 
 
 def _breakpoints(u: Any, t: Array) -> Array:

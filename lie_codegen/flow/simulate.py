@@ -221,7 +221,9 @@ def _magnus(
 
 def _with_start(start: Array, later: Array) -> Array:
     """(k, ...) with the initial element in front."""
-    return np.concatenate([np.broadcast_to(start, (1, *later.shape[1:])), later])
+    X = np.empty((len(later) + 1, *later.shape[1:]), later.dtype)
+    X[0], X[1:] = start, later
+    return X
 
 
 def _is_simulated(what: Any) -> TypeGuard[Simulated]:

@@ -109,7 +109,7 @@ def factors_of(group: MatrixGroup, eps: ArrayLike) -> Array:
         factors = np.asarray(eps, dtype=float)
     except (TypeError, ValueError):
         raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number") from None
-    if not np.all(np.isfinite(factors)):
+    if not np.isfinite(factors).all():
         raise NotFiniteError(f"simulate({group.name}): eps is {eps!r}; give a finite number")
     if factors.ndim > 1 or not factors.size:
         raise ShapeError(f"simulate({group.name}): eps has shape {factors.shape}; give a number, or (N,) of them")
@@ -141,9 +141,9 @@ def check_times(group: MatrixGroup, t: ArrayLike) -> Array:
         raise InputError(f"simulate({group.name}): t must be an array of numbers, got {t!r}") from None
     if times.ndim != 1 or len(times) < 2:
         raise ShapeError(f"simulate({group.name}): t has shape {times.shape}; give two or more times")
-    if not np.all(np.isfinite(times)):
+    if not np.isfinite(times).all():
         raise NotFiniteError(f"simulate({group.name}): t holds NaN or infinity")
-    if np.any(np.diff(times) <= 0):
+    if (times[1:] <= times[:-1]).any():
         raise InputError(f"simulate({group.name}): t must increase strictly")
     return times
 

@@ -47,6 +47,8 @@ def shows_progress(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:
+        if not _somebody_watches():
+            return function(*args, **named)
         with progress(function.__name__):
             return function(*args, **named)
 

@@ -141,5 +141,5 @@ def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
 
 
 def _row(factor: Array) -> tuple[Array, int | None]:
-    values = np.asarray(factor, dtype=float)
-    return np.ascontiguousarray(np.atleast_1d(values)), len(values) if values.ndim else None
+    row = np.ascontiguousarray(factor, dtype=float)  # of a number a row of one
+    return row, len(row) if np.ndim(factor) else None
