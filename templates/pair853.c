@@ -4,7 +4,7 @@
  * y holds Theta (the first `group` entries), then xi, then what else there is. Within a step X = X_0 exp(Theta), Theta' = dexp^-1 xi, so
  * that the pair sees a vector; after it X_0 <- X_0 exp(Theta), Theta = 0. F and the product are kernels, given by address:
  *     rate(X_0, y, t, numbers...) -> y'        move(X_0, Theta) -> X_0 exp(Theta)
- * Several members go with one step size: the one that needs the shortest decides.
+ * One member; many go on lanes, with pair_lanes.c.
  *
  * States are wanted at given times. A step ends there if two or more such times lie in it; a single one is reached by a step
  * of its own beside, since the interpolant of the pair errs a hundred times more than its steps.
@@ -24,40 +24,37 @@
 enum { MOST_NUMBERS = 32, DONE = 0, FULL = 1, STUCK = 2, LOST = 3 };
 
 typedef void (*Call)(const double *const *in, double *const *out);
-typedef void (*Batch)(ptrdiff_t count, const double *const *in, const ptrdiff_t *strides, double *const *out);
 
 typedef struct {
-    Call rate, move;                /* of one member; NULL where there are several */
-    Batch rate_batch, move_batch;
-    ptrdiff_t members, packed, group, size, numbers;
+    Call rate, move;
+    ptrdiff_t packed, group, size, numbers;
     const double *const *number;    /* inputs of the rate beside X, y and t */
-    const ptrdiff_t *number_stride; /* in doubles from member to member */
     double t, t_low, h, rtol, atol, reach, longest; /* |Theta| stays within reach; h at most longest (the step to begin with, or 0) */
-    double *X, *y;                  /* members x packed, members x size with room for the padding behind */
+    double *X, *y;                  /* packed, size with room for the padding behind */
     const double *times;            /* that are wanted, all after t at the start */
-    ptrdiff_t count, next, row;     /* of them; those that are done; members of all rows of the outputs */
-    double *X_out, *y_out;          /* count x row x packed, count x row x size */
-    double *knot_t, *knot_h, *knot_X, *knot_y; /* accepted steps, of one member; NULL if not wanted */
+    ptrdiff_t count, next;          /* of them; those that are done */
+    double *X_out, *y_out;          /* count x packed, count x size */
+    double *knot_t, *knot_h, *knot_X, *knot_y; /* accepted steps; NULL if not wanted */
     ptrdiff_t room, knots;
-    double *work;                   /* (STAGES + 4) vectors, each padded to whole eights, + members x (2 packed + group) */
+    double *work;                   /* (STAGES + 4) vectors, each padded to whole eights, + 2 packed */
     ptrdiff_t steps, rejected, evaluations;
 } Pair;
 
 /* The parts of `work`. */
 typedef struct {
-    double *k, *stage, *after, *more, *last; /* STAGES, 1, 1, 1 and 1 vectors of all members */
-    double *scratch, *aside, *theta;         /* elements twice, then Theta */
+    double *k, *stage, *after, *more, *last; /* STAGES, 1, 1, 1 and 1 vectors */
+    double *scratch, *aside;                 /* elements */
 } Room;
 
-/* Entries of y of all members, padded to whole eights: sums go eight at a time, and nobody reads what they make of the padding. */
+/* Entries of y, padded to whole eights: sums go eight at a time, and nobody reads what they make of the padding. */
 static ptrdiff_t wide(const Pair *p)
 {
-    return (p->members * p->size + 7) / 8 * 8;
+    return (p->size + 7) / 8 * 8;
 }
 
 static Room room_of(const Pair *p)
 {
-    const ptrdiff_t all = wide(p), elements = p->members * p->packed;
+    const ptrdiff_t all = wide(p);
     Room room;
     room.k = p->work;
     room.stage = room.k + all * STAGES;
@@ -65,8 +62,7 @@ static Room room_of(const Pair *p)
     room.more = room.after + all;
     room.last = room.more + all;
     room.scratch = room.last + all;
-    room.aside = room.scratch + elements;
-    room.theta = room.aside + elements;
+    room.aside = room.scratch + p->packed;
     return room;
 }
 
@@ -82,15 +78,7 @@ static void rates(Pair *p, const double *X, const double *y, double t, double *t
         in[3 + k] = p->number[k];
     }
     ++p->evaluations;
-    if (p->members == 1 && p->rate) {
-        p->rate(in, out);
-    } else {
-        ptrdiff_t strides[3 + MOST_NUMBERS] = {p->packed, p->size, 0};
-        for (ptrdiff_t k = 0; k < p->numbers; ++k) {
-            strides[3 + k] = p->number_stride[k];
-        }
-        p->rate_batch(p->members, in, strides, out);
-    }
+    p->rate(in, out);
 }
 
 /* X <- X exp(Theta), Theta = 0. */
@@ -99,20 +87,9 @@ static void settle(Pair *p, double *X, double *y)
     const Room room = room_of(p);
     double *out[1] = {room.scratch};
     const double *in[2] = {X, y};
-    if (p->members == 1 && p->move) {
-        p->move(in, out);
-    } else { /* lanes read samples that lie side by side */
-        const ptrdiff_t strides[2] = {p->packed, p->group};
-        for (ptrdiff_t m = 0; m < p->members; ++m) {
-            memcpy(room.theta + m * p->group, y + m * p->size, (size_t)p->group * sizeof(double));
-        }
-        in[1] = room.theta;
-        p->move_batch(p->members, in, strides, out);
-    }
-    memcpy(X, room.scratch, (size_t)(p->members * p->packed) * sizeof(double));
-    for (ptrdiff_t m = 0; m < p->members; ++m) {
-        memset(y + m * p->size, 0, (size_t)p->group * sizeof(double));
-    }
+    p->move(in, out);
+    memcpy(X, room.scratch, (size_t)p->packed * sizeof(double));
+    memset(y, 0, (size_t)p->group * sizeof(double));
 }
 
 /* Where in a run the slopes are asked for: within a step X stays. */
@@ -136,40 +113,29 @@ static void advance(Pair *p, const double *X, const double *y, double t, double 
 }
 
 /*
- * The error of a step over what is allowed, of the worst member. Entries of Theta are those of X, whose size is one. Negative where |Theta| goes beyond its reach; NaN shows.
+ * The error of a step over what is allowed. Entries of Theta are those of X, whose size is one. Negative where |Theta| goes beyond its reach; NaN shows.
  */
 static double judged(const Pair *p, const double *y, const double *after, double h, const double *k)
 {
     const Room room = room_of(p);
-    double worst = 0.0;
+    double five = 0.0, three = 0.0, angle = 0.0, error;
     pair_errors(k, wide(p), room.more, room.last);
-    for (ptrdiff_t m = 0; m < p->members; ++m) {
-        double five = 0.0, three = 0.0, angle = 0.0;
-        for (ptrdiff_t i = 0; i < p->size; ++i) {
-            const ptrdiff_t at = m * p->size + i;
-            const double a = fabs(y[at]), b = fabs(after[at]), size = i < p->group ? 1.0 : a > b ? a : b;
-            const double units = 1.0 / (p->atol + p->rtol * size), e5 = units * room.more[at], e3 = units * room.last[at];
-            five += e5 * e5;
-            three += e3 * e3;
-            angle += i < p->group ? after[at] * after[at] : 0.0;
-        }
-        const double error = pair_error(five, three, h, p->size);
-        if (!(error <= 1e300)) {
-            return error;
-        }
-        if (angle > p->reach * p->reach) {
-            return -sqrt(angle) / p->reach;
-        }
-        worst = error > worst ? error : worst;
+    for (ptrdiff_t i = 0; i < p->size; ++i) {
+        const double a = fabs(y[i]), b = fabs(after[i]), size = i < p->group ? 1.0 : a > b ? a : b;
+        const double units = 1.0 / (p->atol + p->rtol * size), e5 = units * room.more[i], e3 = units * room.last[i];
+        five += e5 * e5;
+        three += e3 * e3;
+        angle += i < p->group ? after[i] * after[i] : 0.0;
     }
-    return worst;
+    error = pair_error(five, three, h, p->size);
+    return error <= 1e300 && angle > p->reach * p->reach ? -sqrt(angle) / p->reach : error;
 }
 
 /* A first step: the size of Theta and of what the rates change. */
 static double first_step(const Pair *p, const double *y, const double *k)
 {
     double fastest = 0.0;
-    for (ptrdiff_t i = 0; i < p->members * p->size; ++i) {
+    for (ptrdiff_t i = 0; i < p->size; ++i) {
         const double rate = fabs(k[i]) / (fabs(y[i]) + 1.0);
         fastest = rate > fastest ? rate : fastest;
     }
@@ -178,10 +144,8 @@ static double first_step(const Pair *p, const double *y, const double *k)
 
 static void keep(Pair *p, const double *X, const double *y)
 {
-    for (ptrdiff_t m = 0; m < p->members; ++m) {
-        memcpy(p->X_out + (p->next * p->row + m) * p->packed, X + m * p->packed, (size_t)p->packed * sizeof(double));
-        memcpy(p->y_out + (p->next * p->row + m) * p->size, y + m * p->size, (size_t)p->size * sizeof(double));
-    }
+    memcpy(p->X_out + p->next * p->packed, X, (size_t)p->packed * sizeof(double));
+    memcpy(p->y_out + p->next * p->size, y, (size_t)p->size * sizeof(double));
     ++p->next;
 }
 
@@ -189,7 +153,6 @@ static void keep(Pair *p, const double *X, const double *y)
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps);
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
 {
-    const ptrdiff_t all = p->members * p->size;
     const Room room = room_of(p);
     double *k = room.k, *stage = room.stage, *after = room.after;
     int fresh = 0;
@@ -238,12 +201,12 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
         ++p->steps;
         if (!ends && gap <= h * (1 + 1e-10)) { /* a step of its own to the time within, from the same first stage */
             double *X = room.aside, *next = room.more;
-            memcpy(X, p->X, (size_t)(p->members * p->packed) * sizeof(double));
+            memcpy(X, p->X, (size_t)p->packed * sizeof(double));
             advance(p, p->X, p->y, p->t, gap, k, stage, next);
             settle(p, X, next);
             keep(p, X, next);
         }
-        memcpy(p->y, after, (size_t)all * sizeof(double));
+        memcpy(p->y, after, (size_t)p->size * sizeof(double));
         settle(p, p->X, p->y);
         if (ends) {
             p->t = p->times[p->next];
@@ -264,7 +227,7 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
     return DONE;
 }
 
-/* Fresh steps of one member from knots: the state `part` of the way through each step, part in [0, 1]. */
+/* Fresh steps from knots: the state `part` of the way through each step, part in [0, 1]. */
 EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out);
 EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out)
 {
@@ -299,7 +262,7 @@ static const double gauss_a[POINTS][POINTS] = {
     {0.2679883337624694517, 0.4804211119693833479, 5.0 / 36}};
 
 /*
- * One member: `spans` times `parts` steps of length h, states kept at the ends of the spans, from p->X, p->y at p->t. The stages are
+ * `spans` times `parts` steps of length h, states kept at the ends of the spans, from p->X, p->y at p->t. The stages are
  * found by iterating until their change no longer shrinks; they begin with those of the step before.
  */
 EXPORT ptrdiff_t gauss_run(Pair *p, ptrdiff_t spans, ptrdiff_t parts);

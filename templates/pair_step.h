@@ -13,32 +13,46 @@
 /* y' = slope(t, y); not 0 where it cannot be had. */
 typedef int (*Slope)(const void *who, double t, const double *y, double *slope);
 
+/* As many doubles as the processor adds at once, anywhere in an array of them: of loops over arrays gcc 12 makes scalar sums. */
+#if !defined(__GNUC__)
+typedef double PairVector;
+#elif defined(__AVX512F__)
+typedef double PairVector __attribute__((vector_size(64), aligned(8), may_alias));
+#elif defined(__AVX__)
+typedef double PairVector __attribute__((vector_size(32), aligned(8), may_alias));
+#else
+typedef double PairVector __attribute__((vector_size(16), aligned(8), may_alias));
+#endif
+
 /*
- * Entries [first, first + WIDTH) of y + h sum_j a_j k_j, kept in registers: a sum over the stages in their order, so that the bits depend
+ * WIDTH entries of y + h sum_j a_j k_j, kept in registers: a sum over the stages in their order, so that the bits depend
  * neither on who calls nor on the width. `used` are the j with a_j other than 0, half of all.
  */
-#define PAIR_SUM(WIDTH)                                                                             \
+#define PAIR_SUM(WIDTH, TYPE)                                                                       \
     static inline void pair_sum_##WIDTH(const double *a, const unsigned char *used, int count, ptrdiff_t n, const double *k, const double *y, double h, double *to) \
     {                                                                                               \
-        double sum[WIDTH];                                                                          \
+        enum { PARTS = WIDTH * sizeof(double) / sizeof(TYPE) };                                     \
+        TYPE sum[PARTS];                                                                            \
         int u, l;                                                                                   \
-        for (l = 0; l < WIDTH; ++l) {                                                               \
-            sum[l] = 0.0;                                                                           \
+        for (l = 0; l < PARTS; ++l) {                                                               \
+            sum[l] = (TYPE){0.0};                                                                   \
         }                                                                                           \
         for (u = 0; u < count; ++u) {                                                               \
-            const double weight = a[used[u]], *from = k + used[u] * n;                              \
-            for (l = 0; l < WIDTH; ++l) {                                                           \
+            const double weight = a[used[u]];                                                       \
+            const TYPE *from = (const TYPE *)(k + used[u] * n);                                     \
+            for (l = 0; l < PARTS; ++l) {                                                           \
                 sum[l] += weight * from[l];                                                         \
             }                                                                                       \
         }                                                                                           \
-        for (l = 0; l < WIDTH; ++l) {                                                               \
-            to[l] = y[l] + h * sum[l];                                                              \
+        for (l = 0; l < PARTS; ++l) {                                                               \
+            ((TYPE *)to)[l] = ((const TYPE *)y)[l] + h * sum[l];                                    \
         }                                                                                           \
     }
-PAIR_SUM(1)
-PAIR_SUM(2)
-PAIR_SUM(4)
-PAIR_SUM(8)
+PAIR_SUM(1, double)
+PAIR_SUM(2, double)
+PAIR_SUM(4, double)
+PAIR_SUM(8, PairVector)
+PAIR_SUM(16, PairVector)
 
 /*
  * The slopes k_2 .. k_12 of a step of length h from (t, y), k_1 being known, and the state after it: n doubles each. `stage` may be
@@ -53,6 +67,9 @@ static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const 
         const int count = USES[s];
         double *to = s < STAGES ? stage : after;
         ptrdiff_t i = 0;
+        for (; i + 16 <= n; i += 16) {
+            pair_sum_16(a, used, count, n, k + i, y + i, h, to + i);
+        }
         for (; i + 8 <= n; i += 8) {
             pair_sum_8(a, used, count, n, k + i, y + i, h, to + i);
         }
@@ -74,30 +91,31 @@ static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const 
     return 0;
 }
 
-/* The two error estimates of entries [first, first + WIDTH) of n, stage after stage. */
-#define PAIR_ERRORS(WIDTH)                                                                          \
+/* The two error estimates of WIDTH entries of n, stage after stage. */
+#define PAIR_ERRORS(WIDTH, TYPE)                                                                    \
     static inline void pair_errors_##WIDTH(const double *k, ptrdiff_t n, double *five, double *three) \
     {                                                                                               \
-        double e5[WIDTH], e3[WIDTH];                                                                \
+        enum { PARTS = WIDTH * sizeof(double) / sizeof(TYPE) };                                     \
+        TYPE e5[PARTS], e3[PARTS];                                                                  \
         int s, l;                                                                                   \
-        for (l = 0; l < WIDTH; ++l) {                                                               \
-            e5[l] = e3[l] = 0.0;                                                                    \
+        for (l = 0; l < PARTS; ++l) {                                                               \
+            e5[l] = e3[l] = (TYPE){0.0};                                                            \
         }                                                                                           \
         for (s = 0; s < STAGES; ++s) {                                                              \
-            const double *from = k + s * n;                                                         \
-            for (l = 0; l < WIDTH; ++l) {                                                           \
+            const TYPE *from = (const TYPE *)(k + s * n);                                           \
+            for (l = 0; l < PARTS; ++l) {                                                           \
                 e5[l] += E5[s] * from[l];                                                           \
                 e3[l] += E3[s] * from[l];                                                           \
             }                                                                                       \
         }                                                                                           \
-        for (l = 0; l < WIDTH; ++l) {                                                               \
-            five[l] = e5[l];                                                                        \
-            three[l] = e3[l];                                                                       \
+        for (l = 0; l < PARTS; ++l) {                                                               \
+            ((TYPE *)five)[l] = e5[l];                                                              \
+            ((TYPE *)three)[l] = e3[l];                                                             \
         }                                                                                           \
     }
-PAIR_ERRORS(1)
-PAIR_ERRORS(2)
-PAIR_ERRORS(8)
+PAIR_ERRORS(1, double)
+PAIR_ERRORS(2, double)
+PAIR_ERRORS(8, PairVector)
 
 /* The two error estimates of all n entries. */
 static void pair_errors(const double *k, ptrdiff_t n, double *five, double *three)

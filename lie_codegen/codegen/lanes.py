@@ -15,8 +15,9 @@ from lie_codegen.errors import CodegenError
 
 #: Statements from which a body is a function of its own.
 INLINE = 400
-#: Statements from which a body is not interleaved with its twin: the processor then finds enough independent work in one
-#: vector of samples, and two run out of registers (measured: 204 and 258 statements gain a sixth and a quarter, 289 lose a tenth).
+#: Statements from which a body is interleaved with its twin only where a vector has fewer than eight lanes. With eight the processor
+#: finds enough independent work in one vector of samples, and two run out of registers (measured: 204 and 258 statements gain a sixth
+#: and a quarter, 289 lose a tenth). With four the half of the work takes as long: 318 statements gain two fifths.
 TWIN = 260
 #: Statements a number that is read or written, up to which a loop of its own stores large results past the caches as they are made: beyond,
 #: computing takes longer than moving, and the compiler's time for a third copy of the body buys nothing.
@@ -111,6 +112,11 @@ class LaneBody:
         return self.size < INLINE
 
     @property
+    def crowded(self) -> bool:
+        """Whether vectors of eight lanes are better taken one by one."""
+        return self.size >= TWIN
+
+    @property
     def size(self) -> int:
         """Number of statements, those in blocks too."""
         return sum(len(s.statements) if isinstance(s, LaneBlock) else 1 for s in self.statements)
@@ -142,7 +148,7 @@ def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBod
     pieces = split(tape, ports)
     if pieces is None:
         body = _body(tape, target)
-        if body.size >= TWIN:
+        if not body.inline:
             return body
         return replace(
             body, twin=_twin(tape, sizes, target), past=body.size <= MOVING * (sum(sizes) + len(body.stores))

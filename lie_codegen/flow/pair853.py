@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
-from lie_codegen.flow.pair_library import FULL, LOST, STUCK, compiled_pair
+from lie_codegen.flow.pair_lanes import run_lanes
+from lie_codegen.flow.pair_library import FULL, MANY, compiled_pair, refuse
 from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.threads import share_out
 
 #: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots, at first for fewer.
 _STEPS, _FIRST_STEPS = 4096, 256
-#: Members that go with one step size: enough for lanes, few enough for the cache.
+#: Members below which a thread costs more than it does.
 _BLOCK = 64
 #: Members of the pilot, and how many times more than the worst of them others may err.
 _PILOT, _MARGIN = 16, 4.0
@@ -40,8 +41,8 @@ class PairRun:
 
     Attributes:
         X, y: (k, N, packed) and (k, N, size) at the times, Theta = 0.
-        steps, rejected: of all blocks of members together, or of one.
-        evaluations: of the rate, for a block at once.
+        steps, rejected: of all members together.
+        evaluations: of the rate, of many members eight at a time.
         error_estimate: of the entries of X and y: the difference to a run with longer steps, over what the tolerances of the two
             promise; of many members that of the pilot.
         knot_t, knot_h, knot_X, knot_y: the start, the length and the state of every step of a single member; else empty.
@@ -63,8 +64,8 @@ class PairRun:
         at = np.ascontiguousarray(knots, dtype=np.intp)
         part = np.ascontiguousarray(parts, dtype=float)
         X, y = np.empty((len(at), system.packed)), np.empty((len(at), system.size))
-        given, _kept = system.record(1)
-        work = system.work(1)
+        given, _kept = system.record()
+        work = system.work()
         given.knot_t, given.knot_h = self.knot_t.ctypes.data, self.knot_h.ctypes.data
         given.knot_X, given.knot_y, given.work = self.knot_X.ctypes.data, self.knot_y.ctypes.data, work.ctypes.data
         library = compiled_pair()
@@ -85,7 +86,7 @@ def integrate(
     """States of N members at the times, the first of which is that of (X0, y0): errors below rtol max(1, |state|) or atol.
 
     One member is run at two tolerances, and again at smaller ones until they agree; of many the tolerance is found by
-    a pilot of sixteen, then each block of 64 holds its own local errors below it.
+    a pilot of sixteen, then each holds its own local errors below it.
 
     Args:
         system: what is integrated.
@@ -103,19 +104,7 @@ def integrate(
     chosen = np.unique(np.linspace(0, len(X0) - 1, min(_PILOT, len(X0))).astype(int))
     pilot, local = _to_tolerance(system.of_members(chosen), X0[chosen], y0[chosen], times, rtol, atol, where)
 
-    def part(first: int, last: int) -> list[PairRun]:
-        runs = []
-        for begin in range(first, last, _BLOCK):
-            some = slice(begin, min(begin + _BLOCK, last))
-            runs.append(_once(system.of_members(some), X0[some], y0[some], times, *local, where))
-        return runs
-
-    runs = [run for share in share_out(part, len(X0), threads, _BLOCK) for run in share]
-    return PairRun(
-        np.concatenate([run.X for run in runs], axis=1), np.concatenate([run.y for run in runs], axis=1),
-        sum(run.steps for run in runs), sum(run.rejected for run in runs), sum(run.evaluations for run in runs),
-        pilot.error_estimate, *_no_knots(system),
-    )  # fmt: skip
+    return replace(_many(system, X0, y0, times, *local, where, threads), error_estimate=pilot.error_estimate)
 
 
 def _to_tolerance(
@@ -143,7 +132,7 @@ def _to_tolerance(
         scale = max(1.0, _size(fine.X), _size(fine.y))
         estimate = 2 * difference / (_RATIO - 1)
         # Rounding: no run of so many steps knows its states better.
-        floor = 1e-15 * scale * sqrt(fine.steps)
+        floor = 1e-15 * scale * sqrt(fine.steps / len(X0))
         goal = max(rtol * scale, atol, floor)
         if estimate <= goal:
             if one:
@@ -171,48 +160,68 @@ def _size(of: Array) -> float:
 
 
 def _once(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
-    """One run of some members with one step size."""
-    N, one = len(X0), len(X0) == 1
+    """One run of some members at local tolerances."""
+    run = _one if len(X0) == 1 else _many
+    return run(system, X0, y0, times, rtol, atol, where)
+
+
+def _many(
+    system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str, threads: int = 1
+) -> PairRun:
+    """One run of members that are shared out over threads; one after another where lanes cannot be had."""
+    X_out, y_out = np.empty((len(times), *X0.shape)), np.empty((len(times), *y0.shape))
+    X_out[0], y_out[0] = X0, y0
+    behind = X_out[1:], y_out[1:]
+
+    def part(first: int, last: int) -> tuple[int, int, int]:
+        some = slice(first, last)
+        if all(system.blocks):
+            record = run_lanes(
+                system.of_members(some), (X0[some], y0[some]), times, behind, first, rtol, atol, _MOST_STEPS, where
+            )
+            return record.steps, record.rejected, record.evaluations
+        runs = []
+        for m in range(first, last):
+            runs.append(
+                _one(system.of_members(slice(m, m + 1)), X0[m : m + 1], y0[m : m + 1], times, rtol, atol, where)
+            )
+            X_out[:, m], y_out[:, m] = runs[-1].X[:, 0], runs[-1].y[:, 0]
+        return sum(run.steps for run in runs), sum(run.rejected for run in runs), sum(run.evaluations for run in runs)
+
+    steps, rejected, evaluations = np.sum(share_out(part, len(X0), threads, _BLOCK), axis=0).tolist()
+    return PairRun(X_out, y_out, steps, rejected, evaluations, nan, *_no_knots(system))
+
+
+def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
+    """One run of a single member, with its knots."""
     packed, size, k = system.packed, system.size, len(times)
-    given, _kept = system.record(N)
-    X_out, y_out = np.empty((k, N, packed)), np.empty((k, N, size))
+    given, _kept = system.record()
+    X_out, y_out = np.empty((k, 1, packed)), np.empty((k, 1, size))
     X_out[0], y_out[0] = X0, y0
     # one block of memory: the state, which is read in whole eights, the times behind the first, what a step works with
-    state = N * (packed + size)
-    block = np.empty(state + k - 1 + system.work_size(N))
-    block[: N * packed], block[N * packed : state], block[state : state + k - 1] = X0.ravel(), y0.ravel(), times[1:]
+    state = packed + size
+    block = np.empty(state + k - 1 + system.work_size)
+    block[:packed], block[packed:state], block[state : state + k - 1] = X0[0], y0[0], times[1:]
     at = block.ctypes.data
     given.t, given.h, given.rtol, given.atol = float(times[0]), 0.0, rtol, atol
     given.reach, given.longest = system.reach, float(times[-1] - times[0])
-    given.X, given.y, given.times, given.work = at, at + 8 * N * packed, at + 8 * state, at + 8 * (state + k - 1)
-    given.count, given.row = k - 1, N
-    given.X_out, given.y_out = X_out.ctypes.data + 8 * N * packed, y_out.ctypes.data + 8 * N * size
+    given.X, given.y, given.times, given.work = at, at + 8 * packed, at + 8 * state, at + 8 * (state + k - 1)
+    given.count = k - 1
+    given.X_out, given.y_out = X_out.ctypes.data + 8 * packed, y_out.ctypes.data + 8 * size
     knots: list[tuple[Array, ...]] = []
     library, status, room = compiled_pair(), FULL, min(_FIRST_STEPS, _STEPS)
     while status == FULL:
-        if one:
-            rows = np.empty(room * (2 + packed + size))
-            first, given.room = rows.ctypes.data, room
-            given.knot_t, given.knot_h = first, first + 8 * room
-            given.knot_X, given.knot_y = first + 16 * room, first + 8 * room * (2 + packed)
+        rows = np.empty(room * (2 + packed + size))
+        first, given.room = rows.ctypes.data, room
+        given.knot_t, given.knot_h = first, first + 8 * room
+        given.knot_X, given.knot_y = first + 16 * room, first + 8 * room * (2 + packed)
         status = library.pair_run(ctypes.addressof(given), room)
-        if one:
-            knots.append(_rows(rows, room, given.knots, packed, size))
+        knots.append(_rows(rows, room, given.knots, packed, size))
         if given.steps + given.rejected > _MOST_STEPS:
-            raise ComputationError(
-                f"{where}: {_MOST_STEPS} steps do not bring the error below {atol:g} beyond t = {given.t:.9g}, or the state grows "
-                "without bound; shorten the time, loosen the tolerance, or check the gains"
-            )
+            status = MANY
         room = _STEPS
-    if status == LOST:
-        raise ComputationError(
-            f"{where}: the state is no longer finite behind t = {given.t:.9g}; check the gains, or shorten the time"
-        )
-    if status == STUCK:
-        raise ComputationError(f"{where}: no step is short enough at t = {given.t:.9g}; is the force smooth there?")
-    kept = _no_knots(system)
-    if one:
-        kept = knots[0] if len(knots) == 1 else tuple(np.concatenate(each) for each in zip(*knots, strict=True))  # type: ignore[assignment]
+    refuse(status, given.t, atol, _MOST_STEPS, where)
+    kept = knots[0] if len(knots) == 1 else tuple(np.concatenate(each) for each in zip(*knots, strict=True))
     return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, nan, *kept)
 
 

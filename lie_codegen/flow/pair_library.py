@@ -7,27 +7,45 @@ from functools import lru_cache
 from typing import Any
 
 from lie_codegen.codegen.templates import template_folder
-from lie_codegen.errors import CompileError
+from lie_codegen.errors import CompileError, ComputationError
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.pair_headers import pair_headers
 from lie_codegen.runtime.sources import build_source
 
 #: Of the pair 8(5,3).
 STAGES = 12
-#: Results of a run: reached the end, more steps are wanted, no step is short enough, a state is no longer finite.
-DONE, FULL, STUCK, LOST = range(4)
+#: Results of a run: reached the end, more steps are wanted, no step is short enough, a state is no longer finite, too many steps.
+DONE, FULL, STUCK, LOST, MANY = range(5)
+
+
+def refuse(status: int, t: float, atol: float, most: int, where: str) -> None:
+    """Say why a run cannot go on.
+
+    Raises:
+        ComputationError: it cannot.
+    """
+    if status == MANY:
+        raise ComputationError(
+            f"{where}: {most} steps do not bring the error below {atol:g} beyond t = {t:.9g}, or the state grows without bound; "
+            "shorten the time, loosen the tolerance, or check the gains"
+        )
+    if status == LOST:
+        raise ComputationError(
+            f"{where}: the state is no longer finite behind t = {t:.9g}; check the gains, or shorten the time"
+        )
+    if status == STUCK:
+        raise ComputationError(f"{where}: no step is short enough at t = {t:.9g}; is the force smooth there?")
 
 
 class Pair(ctypes.Structure):
     """`struct pair` of templates/pair853.c."""
 
     _fields_ = [
-        *((n, ctypes.c_void_p) for n in ("rate", "move", "rate_batch", "move_batch")),
-        *((n, ctypes.c_ssize_t) for n in ("members", "packed", "group", "size", "numbers")),
-        *((n, ctypes.c_void_p) for n in ("number", "number_stride")),
+        *((n, ctypes.c_void_p) for n in ("rate", "move")),
+        *((n, ctypes.c_ssize_t) for n in ("packed", "group", "size", "numbers")), ("number", ctypes.c_void_p),
         *((n, ctypes.c_double) for n in ("t", "t_low", "h", "rtol", "atol", "reach", "longest")),
         *((n, ctypes.c_void_p) for n in ("X", "y", "times")),
-        *((n, ctypes.c_ssize_t) for n in ("count", "next", "row")),
+        *((n, ctypes.c_ssize_t) for n in ("count", "next")),
         *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y")),
         *((n, ctypes.c_ssize_t) for n in ("room", "knots")), ("work", ctypes.c_void_p),
         *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations")),

@@ -56,14 +56,15 @@ class System:
         kept = [v[which] if self._is_own(k) else v for k, v in enumerate(self.numbers)]
         return replace(self, numbers=tuple(kept))
 
-    def work_size(self, members: int) -> int:
-        """Doubles that a step of so many members works with, as templates/pair853.c lays them out."""
-        wide = -(-members * self.size // 8) * 8
-        return wide * (STAGES + 4) + members * (2 * self.packed + self.group)
+    @cached_property
+    def work_size(self) -> int:
+        """Doubles that a step of a single member works with, as templates/pair853.c lays them out."""
+        wide = -(-self.size // 8) * 8
+        return wide * (STAGES + 4) + 2 * self.packed
 
-    def work(self, members: int) -> Array:
-        """Room for a step of so many members."""
-        return np.empty(self.work_size(members))
+    def work(self) -> Array:
+        """Room for a step."""
+        return np.empty(self.work_size)
 
     @cached_property
     def _one(self) -> tuple[int, int]:
@@ -71,26 +72,24 @@ class System:
         return self.rate.backend.address(many=False), self.move.backend.address(many=False)
 
     @cached_property
-    def _many(self) -> tuple[int, int]:
-        """Where those of many are, which are compiled when they are first asked for."""
+    def blocks(self) -> tuple[int, int]:
+        """Where those of eight members at once are, which are compiled when they are first asked for; 0 where they cannot be."""
         return self.rate.backend.address(many=True), self.move.backend.address(many=True)
 
-    def record(self, members: int) -> tuple[Pair, Sequence[Any]]:
-        """The system as the C reads it, and what has to stay."""
+    def members_numbers(self) -> tuple[list[Array], list[int]]:
+        """The numbers as C reads them, and how far it is from one member to the next: 0 where all have the same."""
         numbers = [np.ascontiguousarray(v, dtype=float) for v in self.numbers]
-        strides = [v[0].size if self._is_own(k) else 0 for k, v in enumerate(numbers)]
+        return numbers, [v[0].size if self._is_own(k) else 0 for k, v in enumerate(numbers)]
+
+    def record(self) -> tuple[Pair, Sequence[Any]]:
+        """The system of a single member as the C reads it, and what has to stay."""
+        numbers, _strides = self.members_numbers()
         pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(v.ctypes.data for v in numbers))
-        moves = (ctypes.c_ssize_t * max(1, len(numbers)))(*strides)
-        given, single = Pair(), members == 1
-        if single:
-            given.rate, given.move = self._one
-        else:
-            given.rate_batch, given.move_batch = self._many
-        given.members, given.packed, given.group, given.size = members, self.packed, self.group, self.size
-        given.numbers, given.number, given.number_stride = (
-            len(numbers), ctypes.addressof(pointers), ctypes.addressof(moves)
-        )  # fmt: skip
-        return given, (numbers, pointers, moves)
+        given = Pair()
+        given.rate, given.move = self._one
+        given.packed, given.group, given.size = self.packed, self.group, self.size
+        given.numbers, given.number = len(numbers), ctypes.addressof(pointers)
+        return given, (numbers, pointers)
 
     def _is_own(self, k: int) -> bool:
         return bool(self.numbers[k].ndim > len(self.rate.inputs[3 + k].shape))

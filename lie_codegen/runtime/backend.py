@@ -64,7 +64,7 @@ class Backend(Protocol):
         """Where the C of `scan` (`scan_batch`) is; 0 if there is none."""
 
     def address(self, *, many: bool) -> int:
-        """Where the C of `call` (`batch`) is; 0 if there is none."""
+        """Where the C of `call` is, or of eight calls at once, with entry i of sample m at 8 i + m; 0 if there is none."""
 
 
 class _Workspace:
@@ -82,6 +82,7 @@ class CtypesBackend:
 
     def __init__(self, library: ctypes.CDLL, signature: Signature, lanes: LaneLibrary | None = None) -> None:
         void, size = ctypes.c_void_p, ctypes.c_ssize_t
+        self._lanes = lanes
         self._open_lanes: Callable[[], ctypes.CDLL] = (lambda: library) if lanes is None else lanes.open
         symbol = signature.symbol
         self._signature = signature
@@ -169,7 +170,11 @@ class CtypesBackend:
         return ctypes.cast(self._scan_batch if many else self._scan, ctypes.c_void_p).value or 0
 
     def address(self, *, many: bool) -> int:
-        return ctypes.cast(self._batch if many else self._call, ctypes.c_void_p).value or 0
+        symbol = self._signature.symbol
+        if not many:
+            return ctypes.cast(self._call, ctypes.c_void_p).value or 0
+        library = None if self._lanes is None else self._lanes.block(symbol)
+        return 0 if library is None else ctypes.cast(library[f"{symbol}_block"], ctypes.c_void_p).value or 0
 
 
 def load_library(path: Path) -> ctypes.CDLL:

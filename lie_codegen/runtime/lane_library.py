@@ -34,23 +34,34 @@ class LaneLibrary:
         self._scalar = scalar
         self._lock = threading.Lock()
         self._opened: ctypes.CDLL | None = None
+        self._blocks: dict[str, ctypes.CDLL | None] = {}
 
     def open(self) -> ctypes.CDLL:
         """The library whose batches run on lanes; the one without where lanes cannot be had."""
         with self._lock:
             if self._opened is None:
-                try:
-                    self._opened = ctypes.CDLL(str(self._find_or_compile()))
-                except (OSError, CompileError, LookupError, ValueError, TypeError) as error:
-                    warn_degraded(BATCHES, str(error))
-                    self._opened = self._scalar
+                self._opened = self._library(()) or self._scalar
             return self._opened
+
+    def block(self, symbol: str) -> ctypes.CDLL | None:
+        """A library of one kernel alone, over blocks of eight samples (`{symbol}_block`); None where it cannot be had."""
+        with self._lock:
+            if symbol not in self._blocks:
+                self._blocks[symbol] = self._library(("-DLCG_BLOCK", f"-DLCG_BLOCK_{symbol}"))
+            return self._blocks[symbol]
+
+    def _library(self, more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
+        try:
+            return ctypes.CDLL(str(self._find_or_compile(more_flags)))
+        except (OSError, CompileError, LookupError, ValueError, TypeError) as error:
+            warn_degraded(BATCHES, str(error))
+            return None
 
     def lanes(self) -> int:
         """Samples at a time."""
         return int(self.open()[f"{self._entry.namespace}_lie_codegen_lanes"]())
 
-    def _find_or_compile(self) -> Path:
+    def _find_or_compile(self, more_flags: tuple[str, ...]) -> Path:
         home = self._entry.library.parent
         folder = home.parent.parent
         sources = cache.read_json(home / _SOURCES)
@@ -59,27 +70,32 @@ class LaneLibrary:
             raise ValueError("the sources of the lanes are gone or damaged")
         compilers = find_compilers()
         compiler = next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
-        key = digest(["lanes", home.name, compiler.identity])
+        key = digest(["lanes", home.name, compiler.identity, *more_flags])
+        flags = (*sources["flags"], *more_flags)
         entry = cache.find_entry(folder, key)
         if entry is None:
             try:
-                entry = self._locked(folder, key, sources, compiler)
+                entry = self._locked(folder, key, sources, compiler, flags)
             except OSError as error:
                 folder = temporary_folder(f"the cache folder {folder} cannot be written: {error.strerror or error}")
-                entry = self._locked(folder, key, sources, compiler)
+                entry = self._locked(folder, key, sources, compiler, flags)
         return entry.library
 
-    def _locked(self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler) -> cache.Entry:
+    def _locked(
+        self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler, flags: tuple[str, ...]
+    ) -> cache.Entry:
         with cache.lock(folder, key):
             found = cache.find_entry(folder, key)
             if found is not None:
                 return found
             try:
-                return self._compile(folder, key, sources, compiler)
+                return self._compile(folder, key, sources, compiler, flags)
             except CompilerStoppedError:
-                return self._compile(folder, key, sources, compiler)
+                return self._compile(folder, key, sources, compiler, flags)
 
-    def _compile(self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler) -> cache.Entry:
+    def _compile(
+        self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler, flags: tuple[str, ...]
+    ) -> cache.Entry:
         return compile_entry(
             folder,
             key,
@@ -87,7 +103,7 @@ class LaneLibrary:
             sources["main"],
             self._entry.namespace,
             compiler,
-            tuple(sources["flags"]),
+            flags,
             self._entry.signatures,
         )
 

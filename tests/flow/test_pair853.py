@@ -204,3 +204,53 @@ def test_blocks_of_steps_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> 
     parts = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
     np.testing.assert_allclose(parts.y, whole.y, rtol=0, atol=1e-13)
     np.testing.assert_allclose(parts.knot_t, whole.knot_t, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 63, 65])
+@pytest.mark.parametrize("name", ["so3", "se3", "sl2"])
+def test_members_go_as_they_would_alone(name: str, count: int) -> None:
+    """Whatever lane a member has, and whoever had it before: to the tolerance, at times that lie unevenly."""
+    n, rng = lc.group(name).dim, np.random.default_rng(count)
+    J = np.array([np.diag(row) for row in rng.uniform(1, 2, (count, n))])
+    xi, times = 0.5 * rng.normal(size=(count, n)), np.array([0.0, 0.05, 0.9, 1.0, 3.0])
+    whole, start_of = with_numbers(free_body(name), J), start(name, xi)
+    together = integrate(whole, *start_of, times, rtol=1e-9, atol=0.0, where="test")
+    for m in range(0, count, 7):
+        one = slice(m, m + 1)
+        X0, y0 = (each[one] for each in start_of)
+        alone = integrate(whole.of_members(one), X0, y0, times, rtol=1e-9, atol=0.0, where="test")
+        allowed = 2e-9 * max(1.0, np.max(np.abs(alone.X)), np.max(np.abs(alone.y)))
+        assert np.max(np.abs(together.X[:, m] - alone.X[:, 0])) <= allowed
+        assert np.max(np.abs(together.y[:, m] - alone.y[:, 0])) <= allowed
+
+
+def test_a_member_takes_its_steps_whoever_its_neighbours_are() -> None:
+    """The same bits in a batch and among other members, in another lane; fast and slow ones mixed."""
+    rng, N = np.random.default_rng(4), 30
+    J = np.array([np.diag(row) for row in rng.uniform(0.5, 3, (N, 3))])
+    k, xi, times = rng.uniform(2, 8, N), rng.normal(size=(N, 3)) * rng.uniform(0.1, 20, (N, 1)), np.linspace(0, 2, 4)
+    system, (X0, y0) = with_numbers(free_body("so3", damping=True), J, k), start("so3", xi)
+    run = pair853._many(system, X0, y0, times, 1e-9, 1e-9, "test")
+    order = rng.permutation(N)[:19]
+    some = pair853._many(system.of_members(order), X0[order], y0[order], times, 1e-9, 1e-9, "test")
+    np.testing.assert_array_equal(some.X, run.X[:, order])
+    np.testing.assert_array_equal(some.y, run.y[:, order])
+
+
+def test_members_go_one_after_another_where_lanes_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    J = np.array([np.diag([1.0, 2.0, z]) for z in (1.5, 2.5, 3.5)])
+    body, begun, times = free_body("so3", damping=True), start("so3", np.ones((3, 3))), np.linspace(0, 4, 3)
+    there = integrate(with_numbers(body, J, 6.0), *begun, times, rtol=1e-9, atol=0.0, where="test")
+    monkeypatch.setattr(System, "blocks", (0, 0))
+    found = integrate(with_numbers(body, J, 6.0), *begun, times, rtol=1e-9, atol=0.0, where="test")
+    np.testing.assert_allclose(found.X, there.X, rtol=0, atol=2e-9)
+    np.testing.assert_allclose(found.y, there.y, rtol=0, atol=2e-9)
+
+
+def test_one_member_that_escapes_stops_them_all() -> None:
+    J, k = np.repeat(np.eye(3)[None], 20, 0), np.full(20, 6.0)
+    k[13] = -1e3
+    with pytest.raises(ComputationError, match=r"no longer finite|no step is short enough|grows without bound"):
+        pair853._many(
+            with_numbers(free_body("so3", damping=True), J, k), *start("so3", np.ones((20, 3))), np.array([0.0, 5.0]), 1e-9, 1e-9, "test"
+        )  # fmt: skip

@@ -1,0 +1,344 @@
+/*
+ * X' = X hat(xi), y' = F(t, X, y) of many members by the explicit pair 8(5,3), to a tolerance: pair853.c over eight lanes.
+ *
+ * A lane takes one member from its start to the last time with steps of its own, and then the next that waits: what a member comes to
+ * does not depend on its neighbours. All that is in work is kept as the kernels take it, entry i of lane l at 8 i + l:
+ *     rate(X_0, y, t, numbers...) -> y'        move(X_0, Theta) -> X_0 exp(Theta)
+ * A step that would pass a wanted time ends there: it costs what a step of its own to that time would, and goes on from it.
+ */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "pair_step.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT
+#endif
+
+/* gcc makes vectors of a loop in a function of its own; within other loops it unrolls it first. */
+#if defined(__GNUC__)
+#define APART __attribute__((noinline))
+#else
+#define APART
+#endif
+
+enum { WIDE = 8, PARTS = WIDE * sizeof(double) / sizeof(PairVector), MOST_NUMBERS = 32, DONE = 0, FULL = 1, STUCK = 2, LOST = 3, MANY = 4 };
+
+typedef void (*Block)(const double *const *in, double *const *out);
+
+typedef struct {
+    Block rate, move;
+    ptrdiff_t members, packed, group, size, numbers;
+    const double *const *number;                  /* inputs of the rate beside X, y and t */
+    const ptrdiff_t *number_stride, *number_size; /* in doubles, from member to member (0: all have the same), and of one */
+    double rtol, atol, reach;                     /* |Theta| stays within reach */
+    const double *X, *y;                          /* members x packed, members x size: where they start, Theta = 0 */
+    const double *times;                          /* the start, and those that are wanted */
+    ptrdiff_t count, row;                         /* of the wanted ones; members of all rows of the outputs */
+    double *X_out, *y_out;                        /* count x row x packed, count x row x size */
+    double *work;                                 /* as `Room` divides it */
+    ptrdiff_t most;                               /* attempts of a member at a step */
+    ptrdiff_t begun;                              /* members that have been given a lane */
+    ptrdiff_t steps, rejected, evaluations;       /* of all members together; of eight at a time */
+    double stopped;                               /* the time of the member that cannot go on */
+    double t[WIDE], t_low[WIDE], h[WIDE];         /* of lanes; h = 0: not known yet */
+    ptrdiff_t member[WIDE], next[WIDE], tries[WIDE]; /* member -1: the lane stands still */
+} Lanes;
+
+typedef struct {
+    double *X, *y, *after, *moved, *k, *five, *three, *size, *number;
+} Room;
+
+static Room room_of(const Lanes *p)
+{
+    const ptrdiff_t all = WIDE * p->size;
+    Room room;
+    room.X = p->work;
+    room.moved = room.X + WIDE * p->packed;
+    room.y = room.moved + WIDE * p->packed;
+    room.after = room.y + all;
+    room.five = room.after + all;
+    room.three = room.five + all;
+    room.size = room.three + all;
+    room.k = room.size + all;
+    room.number = room.k + STAGES * all;
+    return room;
+}
+
+/* `size` numbers into a lane. */
+static void put(double *to, ptrdiff_t lane, const double *from, ptrdiff_t size)
+{
+    for (ptrdiff_t i = 0; i < size; ++i) {
+        to[WIDE * i + lane] = from[i];
+    }
+}
+
+static void get(double *to, ptrdiff_t lane, const double *from, ptrdiff_t size)
+{
+    for (ptrdiff_t i = 0; i < size; ++i) {
+        to[i] = from[WIDE * i + lane];
+    }
+}
+
+/* A member at its start into a lane. */
+static void enter(Lanes *p, ptrdiff_t lane, ptrdiff_t member)
+{
+    const Room room = room_of(p);
+    double *number = room.number;
+    put(room.X, lane, p->X + member * p->packed, p->packed);
+    put(room.y, lane, p->y + member * p->size, p->size);
+    for (ptrdiff_t k = 0; k < p->numbers; ++k) {
+        put(number, lane, p->number[k] + member * p->number_stride[k], p->number_size[k]);
+        number += WIDE * p->number_size[k];
+    }
+    p->t[lane] = p->times[0];
+    p->t_low[lane] = p->h[lane] = 0.0;
+    p->next[lane] = p->tries[lane] = 0;
+    p->member[lane] = member;
+}
+
+/* Slopes at the part `s` of each lane's step of length h, times h. */
+typedef struct {
+    Lanes *lanes;
+    const double *h;
+} Within;
+
+static void rates(Lanes *p, const double *y, const double *t, double *to)
+{
+    const Room room = room_of(p);
+    const double *in[3 + MOST_NUMBERS], *number = room.number;
+    double *out[1];
+    in[0] = room.X;
+    in[1] = y;
+    in[2] = t;
+    out[0] = to;
+    for (ptrdiff_t k = 0; k < p->numbers; ++k) {
+        in[3 + k] = number;
+        number += WIDE * p->number_size[k];
+    }
+    ++p->evaluations;
+    p->rate(in, out);
+}
+
+/* k_l <- h_l k_l in each lane l. */
+static void stretch(double *k, ptrdiff_t size, const double *h)
+{
+    const PairVector *by = (const PairVector *)h;
+    for (ptrdiff_t i = 0; i < size; ++i) {
+        PairVector *of = (PairVector *)(k + WIDE * i);
+        for (int part = 0; part < PARTS; ++part) {
+            of[part] *= by[part];
+        }
+    }
+}
+
+static int slope_of(const void *who, double s, const double *y, double *slope)
+{
+    const Within *within = who;
+    Lanes *p = within->lanes;
+    double t[WIDE];
+    for (int l = 0; l < WIDE; ++l) {
+        t[l] = p->t[l] + s * within->h[l];
+    }
+    rates(p, y, t, slope);
+    stretch(slope, p->size, within->h);
+    return 0;
+}
+
+/* First steps of lanes that have none: by the size of Theta and of what the rates change. */
+static void begin(Lanes *p)
+{
+    const Room room = room_of(p);
+    double fastest[WIDE] = {0.0};
+    for (ptrdiff_t i = 0; i < p->size; ++i) {
+        for (int l = 0; l < WIDE; ++l) {
+            const double rate = fabs(room.k[WIDE * i + l]) / (fabs(room.y[WIDE * i + l]) + 1.0);
+            fastest[l] = rate > fastest[l] ? rate : fastest[l];
+        }
+    }
+    for (int l = 0; l < WIDE; ++l) {
+        if (p->h[l] == 0.0) {
+            p->h[l] = fastest[l] > 0.0 ? 0.3 / fastest[l] : INFINITY;
+        }
+    }
+}
+
+/* The length of a lane's next step, at most to the next time; whether it ends there. */
+static double cut(const Lanes *p, int l, int *ends)
+{
+    const double gap = p->times[p->next[l] + 1] - p->t[l] - p->t_low[l], h = p->h[l];
+    *ends = gap <= h * (1 + 1e-10);
+    return *ends ? gap : gap < 1.9 * h ? 0.5 * gap : h; /* not a step and a crumb */
+}
+
+/* Squares of entries over what is allowed; of entries of Theta, which are those of X, the size is one. */
+static APART void weigh(const Lanes *p)
+{
+    const Room room = room_of(p);
+    const ptrdiff_t angles = WIDE * p->group, all = WIDE * p->size;
+    for (ptrdiff_t at = 0; at < angles; ++at) {
+        room.size[at] = 1.0 / (p->atol + p->rtol);
+    }
+    for (ptrdiff_t at = angles; at < all; ++at) {
+        const double a = fabs(room.y[at]), b = fabs(room.after[at]);
+        room.size[at] = 1.0 / (p->atol + p->rtol * (a > b ? a : b));
+    }
+    for (ptrdiff_t at = 0; at < all; ++at) {
+        const double e5 = room.size[at] * room.five[at], e3 = room.size[at] * room.three[at];
+        room.five[at] = e5 * e5;
+        room.three[at] = e3 * e3;
+    }
+}
+
+/* Of each lane: the error over what is allowed (pair853.c), |Theta|^2, and by how much the step may grow for that error. */
+static APART void judge(const Lanes *p, double *error, double *angle, double *growth)
+{
+    const Room room = room_of(p);
+    PairVector five[PARTS], three[PARTS], squares[PARTS];
+    memset(five, 0, sizeof five);
+    memset(three, 0, sizeof three);
+    memset(squares, 0, sizeof squares);
+    pair_errors(room.k, WIDE * p->size, room.five, room.three);
+    weigh(p);
+    for (ptrdiff_t i = 0; i < p->size; ++i) {
+        for (int part = 0; part < PARTS; ++part) {
+            five[part] += ((const PairVector *)(room.five + WIDE * i))[part];
+            three[part] += ((const PairVector *)(room.three + WIDE * i))[part];
+        }
+    }
+    for (ptrdiff_t i = 0; i < p->group; ++i) {
+        for (int part = 0; part < PARTS; ++part) {
+            const PairVector theta = ((const PairVector *)(room.after + WIDE * i))[part];
+            squares[part] += theta * theta;
+        }
+    }
+    memcpy(angle, squares, sizeof squares);
+    for (int l = 0; l < WIDE; ++l) {
+        error[l] = pair_error(((const double *)five)[l], ((const double *)three)[l], 1.0, p->size);
+    }
+    for (int l = 0; l < WIDE; ++l) {
+        growth[l] = 0.9 / sqrt(sqrt(sqrt(error[l])));
+    }
+}
+
+/* Whether a lane's step of length h is taken; if it is not, the next is shorter. `why` it cannot be shorter, or DONE. */
+static int accepted(Lanes *p, int l, double h, double error, double growth, double angle, int *why)
+{
+    const int runs = error <= 1e300, far = runs && angle > p->reach * p->reach;
+    if (error <= 1.0 && !far) {
+        return 1;
+    }
+    /* Theta grows about as h does: the first length ends at 0.9 of its reach */
+    const double factor = far ? 0.9 * p->reach / sqrt(angle) : growth;
+    ++p->rejected;
+    p->h[l] = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN, and where the stages ran away: how far says nothing */
+    if (!(p->h[l] > 1e-15 * fabs(p->t[l])) || p->h[l] < 1e-300) { /* t + h would be t */
+        *why = runs ? STUCK : LOST;
+    }
+    return 0;
+}
+
+/* A lane behind a step of length h: its time, its output, the length of the next. */
+static void go_on(Lanes *p, int l, double h, double growth, int ends)
+{
+    const Room room = room_of(p);
+    const double wish = p->h[l], longer = h * (growth > 6.0 ? 6.0 : growth < 0.2 ? 0.2 : growth);
+    ++p->steps;
+    p->h[l] = h < wish && longer < wish ? wish : longer; /* a step that was cut says nothing against its length */
+    if (ends) {
+        const ptrdiff_t at = p->next[l] * p->row + p->member[l];
+        get(p->X_out + at * p->packed, l, room.X, p->packed);
+        get(p->y_out + at * p->size, l, room.y, p->size);
+        p->t[l] = p->times[++p->next[l]];
+        p->t_low[l] = 0.0;
+        p->member[l] = p->next[l] < p->count ? p->member[l] : -1;
+    } else { /* the sum in two doubles */
+        const double sum = p->t[l] + h, rest = (p->t[l] - sum) + h + p->t_low[l];
+        p->t[l] = sum + rest;
+        p->t_low[l] = rest - (p->t[l] - sum);
+    }
+}
+
+/* The state behind the steps of the lanes that `take` it: X exp(Theta), Theta = 0. */
+static void settle(Lanes *p, const int *take)
+{
+    const Room room = room_of(p);
+    const double *in[2] = {room.X, room.after};
+    double *out[1] = {room.moved};
+    p->move(in, out);
+    for (int l = 0; l < WIDE; ++l) {
+        for (ptrdiff_t i = 0; take[l] && i < p->packed; ++i) {
+            room.X[WIDE * i + l] = room.moved[WIDE * i + l];
+        }
+        for (ptrdiff_t i = p->group; take[l] && i < p->size; ++i) { /* Theta in y stays 0 */
+            room.y[WIDE * i + l] = room.after[WIDE * i + l];
+        }
+    }
+}
+
+/* Lanes that stand still are given members that wait; whether one has work. */
+static int fill(Lanes *p)
+{
+    int works = 0;
+    for (int l = 0; l < WIDE; ++l) {
+        if (p->member[l] < 0 && p->begun < p->members) {
+            enter(p, l, p->begun++);
+        }
+        works |= p->member[l] >= 0;
+    }
+    return works;
+}
+
+/* All lanes at the first member, but none at work. */
+EXPORT void lanes_start(Lanes *p);
+EXPORT void lanes_start(Lanes *p)
+{
+    for (int l = 0; l < WIDE; ++l) {
+        enter(p, l, 0);
+        p->member[l] = -1;
+    }
+}
+
+/* So many steps of every lane, or until all members are at the last time; FULL: call again. */
+EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds);
+EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds)
+{
+    const Room room = room_of(p);
+    for (ptrdiff_t round = 0; fill(p); ++round) {
+        double h[WIDE], error[WIDE], growth[WIDE], angle[WIDE];
+        int ends[WIDE], take[WIDE], any = 0, why = DONE;
+        const Within within = {p, h};
+        if (round == rounds) {
+            return FULL;
+        }
+        rates(p, room.y, p->t, room.k);
+        begin(p);
+        for (int l = 0; l < WIDE; ++l) {
+            h[l] = p->member[l] < 0 ? 0.0 : cut(p, l, ends + l);
+        }
+        stretch(room.k, p->size, h);
+        pair_step(slope_of, &within, WIDE * p->size, 0.0, room.y, 1.0, room.k, room.after, room.after);
+        judge(p, error, angle, growth);
+        for (int l = 0; l < WIDE; ++l) {
+            const int works = p->member[l] >= 0;
+            take[l] = works && accepted(p, l, h[l], error[l], growth[l], angle[l], &why);
+            any |= take[l];
+            if (works && (why != DONE || ++p->tries[l] > p->most)) {
+                p->stopped = p->t[l];
+                return why != DONE ? why : MANY;
+            }
+        }
+        if (any) {
+            settle(p, take);
+        }
+        for (int l = 0; l < WIDE; ++l) {
+            if (take[l]) {
+                go_on(p, l, h[l], growth[l], ends[l]);
+            }
+        }
+    }
+    return DONE;
+}
