@@ -9,7 +9,7 @@ import typer
 
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
-from lie_codegen.cli.steering_texts import numbers, obstacle_ball, obstacle_cone, target_of
+from lie_codegen.cli.steering_texts import BALL, BOX, CONE, CYLINDER, numbers, obstacles_of, target_of
 
 _Optional = typer.Option
 
@@ -25,8 +25,10 @@ def page(
         str | None, _Optional(help="Positive weights of the controls' energies, comma-separated.")
     ] = None,
     body: Annotated[str | None, _Optional(help="box, satellite, vehicle, car, arrow, or a glTF file.")] = None,
-    cone: Annotated[list[str] | None, _Optional(help="AXIS@DIRECTION@ANGLE, as of steer; repeatable.")] = None,
-    ball: Annotated[list[str] | None, _Optional(help="CENTER@RADIUS, as of steer; repeatable.")] = None,
+    cone: Annotated[list[str] | None, _Optional(help=f"{CONE}, as of steer; repeatable.")] = None,
+    ball: Annotated[list[str] | None, _Optional(help=f"{BALL}, as of steer; repeatable.")] = None,
+    box: Annotated[list[str] | None, _Optional(help=f"{BOX}, as of steer; repeatable.")] = None,
+    cylinder: Annotated[list[str] | None, _Optional(help=f"{CYLINDER}, as of steer; repeatable.")] = None,
     solve: Annotated[
         bool | None,
         _Optional(
@@ -46,7 +48,7 @@ def page(
     g = load(group)
     names = [name.strip() for name in controls.split(",")] if controls else list(g.labels)
     goal: Any = target_of(target, g) if target is not None else [0.5] * g.dim
-    obstacles: list[Any] = [*map(obstacle_cone, cone or ()), *map(obstacle_ball, ball or ())]
+    obstacles = obstacles_of(cone, ball, box, cylinder)
     options: dict[str, Any] = {"obstacles": obstacles} if obstacles else {"method": "optimal"}
     if weights is not None:
         options["weights"] = numbers(weights, "--weights")

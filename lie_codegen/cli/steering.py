@@ -9,7 +9,17 @@ import typer
 
 from lie_codegen.cli.groups import GroupName, Json
 from lie_codegen.cli.output import emit
-from lie_codegen.cli.steering_texts import limits_of, numbers, obstacle_ball, obstacle_cone, target_of, via_point
+from lie_codegen.cli.steering_texts import (
+    BALL,
+    BOX,
+    CONE,
+    CYLINDER,
+    limits_of,
+    numbers,
+    obstacles_of,
+    target_of,
+    via_point,
+)
 
 _Optional = typer.Option
 _LIMITS = "one number, low:high, or label=either, comma-separated."
@@ -55,9 +65,18 @@ def steer(
         list[str] | None, _Optional(help="FRACTION@COORDINATES: a point to pass through, say 0.5@0.1,0,0; repeatable.")
     ] = None,
     cone: Annotated[
-        list[str] | None, _Optional(help="AXIS@DIRECTION@ANGLE: keep a body axis so far from a direction; repeatable.")
+        list[str] | None, _Optional(help=f"{CONE}: keep a body axis so far from a direction; repeatable.")
     ] = None,
-    ball: Annotated[list[str] | None, _Optional(help="CENTER@RADIUS: keep out of a ball; repeatable.")] = None,
+    ball: Annotated[list[str] | None, _Optional(help=f"{BALL}: keep out of a ball; repeatable.")] = None,
+    box: Annotated[
+        list[str] | None,
+        _Optional(
+            help=f"{BOX}: keep out of a box, turned by an angle in the plane, in space by the nine numbers of a rotation; repeatable."
+        ),
+    ] = None,
+    cylinder: Annotated[
+        list[str] | None, _Optional(help=f"{CYLINDER}: keep out of a cylinder, a bar in the plane; repeatable.")
+    ] = None,
     intervals: Annotated[int | None, _Optional(help="Of transcription: pieces of the controls.")] = None,
     pieces: Annotated[int | None, _Optional(help="Of direct: constant pieces of the search.")] = None,
     seed: Annotated[int | None, _Optional(help="Of direct: of the first guesses.")] = None,
@@ -80,7 +99,7 @@ def steer(
 
         picture_path(picture)  # before anything is solved
     g = load(group)
-    obstacles: list[Any] = [*map(obstacle_cone, cone or ()), *map(obstacle_ball, ball or ())]
+    obstacles = obstacles_of(cone, ball, box, cylinder)
     options: dict[str, Any] = {
         "weights": None if weights is None else numbers(weights, "--weights"),
         "starts": starts,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import InputError, ShapeError
 
 if TYPE_CHECKING:
     from lie_codegen.groups.matrix_group import MatrixGroup
-    from lie_codegen.steering.constraints import Ball, Cone
+    from lie_codegen.steering.blocks import Box, Cylinder
+    from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 
+Texts = list[str] | None
+CONE, BALL = "AXIS@DIRECTION@ANGLE", "CENTER@RADIUS"
+BOX, CYLINDER = "CENTER@HALF_SIZES[@TURN]", "START@END@RADIUS[@rounded]"
 Limits = float | tuple[float, float]
 
 
@@ -74,7 +78,7 @@ def obstacle_cone(text: str) -> Cone:
     """ "0,0,1@1,0,0@0.3": a body axis, a direction of space, an angle in rad."""
     from lie_codegen.steering.constraints import Cone
 
-    axis, direction, angle = _parts(text, "--cone", "AXIS@DIRECTION@ANGLE", 3)
+    axis, direction, angle = _parts(text, "--cone", CONE, 3)
     a, d = (numbers(each, "--cone", ("x", "y", "z")) for each in (axis, direction))
     return Cone((a[0], a[1], a[2]), (d[0], d[1], d[2]), _one(angle, "--cone"))
 
@@ -83,8 +87,52 @@ def obstacle_ball(text: str) -> Ball:
     """ "1,0.5@0.2": a center and a radius."""
     from lie_codegen.steering.constraints import Ball
 
-    center, radius = _parts(text, "--ball", "CENTER@RADIUS", 2)
+    center, radius = _parts(text, "--ball", BALL, 2)
     return Ball(tuple(numbers(center, "--ball")), _one(radius, "--ball"))
+
+
+def obstacle_box(text: str) -> Box:
+    """ "1,0.5@0.2,0.3@pi/6": a center, half sizes, and how it is turned, if it is: an angle in the plane, the nine numbers of the
+    rotation by rows in space.
+    """
+    import numpy as np
+
+    from lie_codegen.steering.blocks import Box
+
+    center, halves, *turn = _parts(text, "--box", BOX, 2, 3)
+    axes: Any = None
+    if turn:
+        given = numbers(turn[0], "--box")
+        if len(given) == 1:
+            c, s = np.cos(given[0]), np.sin(given[0])
+            axes = [[c, -s], [s, c]]
+        elif len(given) == 9:
+            axes = np.reshape(given, (3, 3))
+        else:
+            raise ShapeError(f"steer: --box is turned by one angle or by nine numbers of a rotation, got {turn[0]!r}")
+    return Box(tuple(numbers(center, "--box")), tuple(numbers(halves, "--box")), axes)
+
+
+def obstacle_cylinder(text: str) -> Cylinder:
+    """ "0,0,0@0,0,2@0.3@rounded": the middles of its ends, a radius, and whether half balls close it."""
+    from lie_codegen.steering.blocks import Cylinder
+
+    start, end, radius, *rounded = _parts(text, "--cylinder", CYLINDER, 3, 4)
+    if rounded and rounded[0].strip() != "rounded":
+        raise InputError(f"steer: --cylinder needs {CYLINDER}, got {text!r}")
+    first, last = (tuple(numbers(each, "--cylinder")) for each in (start, end))
+    return Cylinder(first, last, _one(radius, "--cylinder"), bool(rounded))
+
+
+def obstacles_of(cones: Texts, balls: Texts, boxes: Texts, cylinders: Texts) -> list[Obstacle]:
+    """What --cone, --ball, --box and --cylinder say, each any number of times."""
+    kinds: Iterable[tuple[Any, Texts]] = (
+        (obstacle_cone, cones),
+        (obstacle_ball, balls),
+        (obstacle_box, boxes),
+        (obstacle_cylinder, cylinders),
+    )
+    return [read(text) for read, texts in kinds for text in texts or ()]
 
 
 def _limit(text: str, option: str) -> Limits:
@@ -101,8 +149,8 @@ def _one(text: str, option: str) -> float:
     return values[0]
 
 
-def _parts(text: str, option: str, form: str, count: int) -> list[str]:
+def _parts(text: str, option: str, form: str, *counts: int) -> list[str]:
     parts = text.split("@")
-    if len(parts) != count:
+    if len(parts) not in counts:
         raise InputError(f"steer: {option} needs {form}, got {text!r}")
     return parts

@@ -12,7 +12,9 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.libraries import logarithms
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.pictures.solid_lines import edges
 from lie_codegen.runtime.rows import row_by_row
+from lie_codegen.steering.blocks import Block
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
 
 BODIES = ("box", "satellite", "vehicle", "car", "arrow")
@@ -97,9 +99,7 @@ def scene_data(scene: Scene, body: str | None, faces: Sequence[Any] | None) -> d
     places = (
         np.concatenate([m.p for m in scene.motions if m.p is not None]) if first.p is not None else np.zeros((1, 3))
     )
-    rounds = [np.asarray(o.center, dtype=float) for o in scene.obstacles if isinstance(o, Ball)]
-    corners = np.concatenate([places, *(np.pad(c, (0, 3 - len(c)))[None] for c in rounds)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low, high = _frame(places, [o for o in scene.obstacles if not isinstance(o, Cone)])
     span = float(np.max(high - low)) if first.p is not None else 0.0
     size = 0.5 if first.p is None else max(1e-9, 0.14 * span) if span > 0 else 0.5
     reach = 1.35 if first.p is None else max(span * 0.62 + size, size * 2)
@@ -139,6 +139,7 @@ def scene_data(scene: Scene, body: str | None, faces: Sequence[Any] | None) -> d
             for o in scene.obstacles
             if isinstance(o, Ball)
         ],
+        "solids": [[line.tolist() for line in edges(o)] for o in scene.obstacles if isinstance(o, Block)],
         "series": [
             {"name": c.name, "unit": c.unit, "labels": list(c.labels), "values": [_finite(v) for v in c.values.T]}
             for c in scene.curves
@@ -146,6 +147,15 @@ def scene_data(scene: Scene, body: str | None, faces: Sequence[Any] | None) -> d
         "facts": [list(pair) for pair in scene.facts],
         "solver": dict(scene.solver),
     }
+
+
+def _frame(places: Array, solids: Sequence[Ball | Block]) -> tuple[Array, Array]:
+    """Least and largest coordinates that are shown: of the places and of solids near them (a long wall does not make the way small)."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    beyond = 0.5 * float(np.max(high - low))
+    ends = [np.pad(corner, ((0, 0), (0, 3 - corner.shape[1]))) for o in solids for corner in o.solid().corners()]
+    shown = np.clip(np.concatenate([places, *ends]), low - beyond, high + beyond)
+    return shown.min(axis=0), shown.max(axis=0)
 
 
 def _legend(scene: Scene, first: Motion) -> str:

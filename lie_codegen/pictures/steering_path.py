@@ -12,6 +12,7 @@ from lie_codegen.errors import ChartError
 from lie_codegen.flow.simulate import simulate
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.quantum_path import bloch_paths
+from lie_codegen.pictures.solid_lines import outline, surface
 from lie_codegen.pictures.steering_loops import COLOURS, GREY
 from lie_codegen.steering.blocks import Block
 from lie_codegen.steering.constraints import Ball, Cone, Obstacle
@@ -130,7 +131,7 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
                 rim = x + obstacle.radius * np.cos(phase), y + obstacle.radius * np.sin(phase)
                 axes.fill(*rim, color=COLOURS[1], alpha=0.3)
             elif isinstance(obstacle, Block):
-                axes.fill(*_outline(obstacle).T, color=COLOURS[1], alpha=0.3)
+                axes.fill(*outline(obstacle).T, color=COLOURS[1], alpha=0.3)
         axes.set_aspect("equal", "datalim")
         axes.grid(color="0.92")
         axes.set(xlabel="x", ylabel="y")
@@ -142,11 +143,11 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
         for obstacle in obstacles:
             if isinstance(obstacle, Ball):
                 a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
-                surface = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])
-                points = np.array(obstacle.center)[:, None, None] + obstacle.radius * surface
+                net = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])
+                points = np.array(obstacle.center)[:, None, None] + obstacle.radius * net
                 axes.plot_wireframe(*points, color=COLOURS[1], linewidth=0.5, alpha=0.4)
             elif isinstance(obstacle, Block):
-                axes.plot_wireframe(*_surface(obstacle), color=COLOURS[1], linewidth=0.5, alpha=0.4)
+                axes.plot_wireframe(*surface(obstacle), color=COLOURS[1], linewidth=0.5, alpha=0.4)
         low, high = np.min(p, axis=0) - 0.15 * size, np.max(p, axis=0) + 0.15 * size
         ends = dict(zip(("xlim", "ylim", "zlim"), zip(low.tolist(), high.tolist(), strict=True), strict=True))
         axes.set(xlabel="x", ylabel="y", zlabel="z", **ends)
@@ -154,31 +155,6 @@ def _positions(figure: Any, place: Any, X: Array, obstacles: Sequence[Obstacle])
     axes.scatter(*p[0], color="white", edgecolor="k", s=25, zorder=3)
     axes.scatter(*p[-1], color="k", s=25, zorder=3)
     axes.set(title="path of the vehicle, from the open to the filled dot")
-
-
-def _outline(solid: Block) -> Array:
-    """(k, 2) the rim of a solid in the plane: of its inner rectangle, moved out by its rounding."""
-    one = solid.solid()
-    phase = np.linspace(0, 2 * np.pi, 101)
-    out = np.column_stack([np.cos(phase), np.sin(phase)])
-    if not one.rounding[0]:
-        out /= np.max(np.abs(out), axis=1)[:, None]
-        return np.asarray(one.centers[0] + (out * one.halves[0]) @ one.axes[0].T)
-    return np.asarray(one.centers[0] + (np.sign(out) * one.halves[0] + one.rounding[0] * out) @ one.axes[0].T)
-
-
-def _surface(solid: Block) -> Array:
-    """(3, a, b) a net of points on a solid in space."""
-    one = solid.solid()
-    a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
-    out = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)], axis=-1)
-    if one.rounding[0]:
-        own = np.sign(out) * one.halves[0] + one.rounding[0] * out
-    elif one.tubes[0]:
-        own = out / np.maximum(np.linalg.norm(out[..., :2], axis=-1), np.abs(out[..., 2]))[..., None] * one.extents[0]
-    else:
-        own = out / np.max(np.abs(out), axis=-1)[..., None] * one.halves[0]
-    return np.moveaxis(one.centers[0] + own @ one.axes[0].T, -1, 0)
 
 
 def _coordinates(axes: Any, plan: Plan, t: Array, X: Array) -> None:

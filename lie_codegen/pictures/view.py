@@ -50,7 +50,7 @@ def view(
         path: the file.
         group: that of a ClosedLoop.
         body: "box", "satellite", "vehicle", "car", "arrow", or a glTF file (.gltf with its buffers inside, or .glb).
-        obstacles: cones and balls, drawn with the motion.
+        obstacles: cones, balls, boxes and cylinders, drawn with the motion.
         title: heading of the page.
         samples: times shown of a Plan and of an average.
         solve: of a plan without bounds on rotations or poses: the generated C, compiled to WebAssembly, goes into the page, and moving the

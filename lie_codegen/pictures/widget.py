@@ -36,7 +36,7 @@ def widget(
         what: a Plan, a Trajectory, a ClosedLoop (give `group`), or an average of `lc.average`.
         group: that of a ClosedLoop.
         body: "box", "satellite", "vehicle", "car", "arrow", or a glTF file.
-        obstacles: cones and balls, drawn with the motion.
+        obstacles: cones, balls, boxes and cylinders, drawn with the motion.
         title: heading of the page.
         samples: times shown of a Plan and of an average.
         solve: of a plan without bounds on rotations or poses: moving the target, by drag or sliders, solves again in the cell.

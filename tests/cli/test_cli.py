@@ -8,11 +8,14 @@ import sys
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import Done
 
+import lie_codegen as lc
 from lie_codegen import __version__
 from lie_codegen.cli.app import main
+from lie_codegen.cli.steering_texts import obstacles_of
 from lie_codegen.codegen.numerics import NUMERICS_VERSION
 
 
@@ -94,6 +97,10 @@ def test_a_bad_group_file_is_refused_with_status_2_and_one_line(cli, case: str, 
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--via", "0.5"), "FRACTION@COORDINATES"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--cone", "0,0,1@1,0@0.3"), "3 real numbers"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--ball", "0,0,1@0.3"), "Ball"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--box", "0,0,1@1,1,1"), "Box"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--box", "0,0,1"), "CENTER@HALF_SIZES"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--box", "0,0,1@1,1,1@1,2"), "nine numbers"),
+        (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--cylinder", "0,0,1@1,1,1@1@flat"), "[@rounded]"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--weights", "1,-2"), "weights"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--starts", "0"), "starts"),
     ],
@@ -105,6 +112,45 @@ def test_a_bad_steering_task_is_refused_with_status_2(
     assert done.returncode == 2
     assert expected in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_obstacles_as_they_are_written() -> None:
+    turned = "0,-1,0,1,0,0,0,0,1"
+    found = obstacles_of(
+        ["0,0,1@1,0,0@1/4"],
+        ["1,0.5@0.2"],
+        ["1,0.5@0.2,0.3@pi/2", f"0,0,1@1,2,3@{turned}", "1,0@1,1"],
+        ["0,0@1,1@0.3", "0,0,0@0,0,2@1/4@rounded"],
+    )
+    expected = [
+        lc.Cone((0, 0, 1), (1, 0, 0), 0.25),
+        lc.Ball((1, 0.5), 0.2),
+        lc.Box((1, 0.5), (0.2, 0.3), [[np.cos(np.pi / 2), -1], [1, np.cos(np.pi / 2)]]),
+        lc.Box((0, 0, 1), (1, 2, 3), [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+        lc.Box((1, 0), (1, 1)),
+        lc.Cylinder((0, 0), (1, 1), 0.3),
+        lc.Cylinder((0, 0, 0), (0, 0, 2), 0.25, rounded=True),
+    ]
+    for one, other in zip(found, expected, strict=True):
+        assert type(one) is type(other)
+        assert vars(one) == vars(other)
+
+
+def test_a_car_goes_around_a_box(cli) -> None:
+    done = cli(
+        "steer",
+        "se2",
+        "--target=0,2,0.2",
+        "--controls",
+        "omega,vx",
+        "--duration",
+        "4",
+        "--box",
+        "1,0.3@0.2,0.25@0.3",
+        "--json",
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["error"] < 1e-6
 
 
 def test_an_output_folder_that_is_not_ours_is_left_alone(cli, tmp_path: Path) -> None:

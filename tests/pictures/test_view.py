@@ -124,6 +124,57 @@ def test_the_command(tmp_path: Path) -> None:
     assert data_of(tmp_path / "q.html")["motions"][0]["kind"] == "plane"
 
 
+TURNED = [[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]
+FLAT = [
+    lc.Box((1.0, 0.8), (0.2, 0.4), [[0.8, -0.6], [0.6, 0.8]]),
+    lc.Cylinder((1.2, -0.9), (1.9, -0.3), 0.1),
+    lc.Cylinder((0.1, -0.9), (0.6, -0.5), 0.1, rounded=True),
+]
+IN_SPACE = [
+    lc.Box((1.0, 0.8, 0.0), (0.2, 0.4, 0.3), TURNED),
+    lc.Cylinder((1.2, -0.9, 0.3), (1.9, -0.3, 0.8), 0.1),
+    lc.Cylinder((0.1, -0.9, 0.0), (0.6, -0.5, 0.7), 0.1, rounded=True),
+]
+
+
+@pytest.mark.parametrize(("name", "solids"), [("se2", FLAT), ("se3", IN_SPACE)])
+def test_boxes_and_cylinders_are_drawn_on_their_surfaces(
+    tmp_path: Path, tab: Any, name: str, solids: list[lc.Box | lc.Cylinder]
+) -> None:
+    """The lines lie on the surfaces (those over the flat ends alone go through nothing else), close, and are seen in a browser."""
+    run = lc.simulate(
+        name, ["0"] * 2 + ["1/2"] if name == "se2" else ["0"] * 3 + ["1/2", "0", "0"], t=np.linspace(0, 4, 11)
+    )
+    page = lc.view(run, tmp_path / "p.html", obstacles=solids)
+    data = data_of(page)
+    for solid, lines in zip(solids, data["solids"], strict=True):
+        q = len(solid.solid().centers[0])
+        X = np.tile(np.eye(q + 1), (sum(map(len, lines)), 1, 1))
+        X[:, :-1, -1] = np.concatenate(lines)[:, :q]
+        assert np.max(np.abs(solid.clearance(X))) < 1e-12
+        for line in lines:
+            middles = (np.array(line[1:]) + np.array(line[:-1])) / 2
+            between = np.tile(np.eye(q + 1), (len(middles), 1, 1))
+            between[:, :-1, -1] = middles[:, :q]
+            assert np.max(np.abs(solid.clearance(between))) < 0.01 * 0.4  # chords of circles
+        assert np.allclose(lines[0][0], lines[0][-1], atol=1e-14)
+    low, high = np.min(np.concatenate(data["solids"][0]), axis=0), np.max(np.concatenate(data["solids"][0]), axis=0)
+    assert np.all(np.abs((low + high) / 2 - data["middle"]) < 2 * data["reach"])
+    tab.set_viewport_size({"width": 320, "height": 800})
+    tab.goto(page.as_uri())
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 320
+    seen = tab.locator("#space").screenshot()
+    tab.goto(lc.view(run, tmp_path / "bare.html").as_uri())
+    assert tab.locator("#space").screenshot() != seen
+
+
+def test_a_long_wall_does_not_make_the_way_small(tmp_path: Path) -> None:
+    run = lc.simulate("se2", ["0", "1/2", "0"], t=np.linspace(0, 4, 11))
+    reach = data_of(lc.view(run, tmp_path / "p.html"))["reach"]
+    wall = data_of(lc.view(run, tmp_path / "w.html", obstacles=[lc.Box((0.0, 60.0), (500.0, 0.1))]))["reach"]
+    assert wall < 2.5 * reach
+
+
 def test_in_a_browser(plan: lc.Plan, tmp_path: Path, tab: Any) -> None:
     tab.goto(lc.view(plan, tmp_path / "p.html", body="satellite", samples=51).as_uri())
     t = np.linspace(0, 24, 51)
