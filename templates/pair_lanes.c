@@ -148,22 +148,16 @@ static int slope_of(const void *who, double s, const double *y, double *slope)
     return 0;
 }
 
-/* First steps of lanes that have none: by the size of Theta and of what the rates change. */
-static void begin(Lanes *p)
+/* A first step: by the size of Theta and of what the rates change. */
+static double first_step(const Lanes *p, int l)
 {
     const Room room = room_of(p);
-    double fastest[WIDE] = {0.0};
+    double fastest = 0.0;
     for (ptrdiff_t i = 0; i < p->size; ++i) {
-        for (int l = 0; l < WIDE; ++l) {
-            const double rate = fabs(room.k[WIDE * i + l]) / (fabs(room.y[WIDE * i + l]) + 1.0);
-            fastest[l] = rate > fastest[l] ? rate : fastest[l];
-        }
+        const double rate = fabs(room.k[WIDE * i + l]) / (fabs(room.y[WIDE * i + l]) + 1.0);
+        fastest = rate > fastest ? rate : fastest;
     }
-    for (int l = 0; l < WIDE; ++l) {
-        if (p->h[l] == 0.0) {
-            p->h[l] = fastest[l] > 0.0 ? 0.3 / fastest[l] : INFINITY;
-        }
-    }
+    return fastest > 0.0 ? 0.3 / fastest : INFINITY;
 }
 
 /* The length of a lane's next step, at most to the next time; whether it ends there. */
@@ -262,18 +256,23 @@ static void go_on(Lanes *p, int l, double h, double growth, int ends)
     }
 }
 
-/* The state behind the steps of the lanes that `take` it: X exp(Theta), Theta = 0. */
-static void settle(Lanes *p, const int *take)
+/* The state behind the steps of the lanes that `take` it, or of all: X exp(Theta); Theta in y stays 0. */
+static void settle(Lanes *p, const int *take, int all)
 {
     const Room room = room_of(p);
     const double *in[2] = {room.X, room.after};
     double *out[1] = {room.moved};
     p->move(in, out);
+    if (all) {
+        memcpy(room.X, room.moved, (size_t)(WIDE * p->packed) * sizeof(double));
+        memcpy(room.y + WIDE * p->group, room.after + WIDE * p->group, (size_t)(WIDE * (p->size - p->group)) * sizeof(double));
+        return;
+    }
     for (int l = 0; l < WIDE; ++l) {
         for (ptrdiff_t i = 0; take[l] && i < p->packed; ++i) {
             room.X[WIDE * i + l] = room.moved[WIDE * i + l];
         }
-        for (ptrdiff_t i = p->group; take[l] && i < p->size; ++i) { /* Theta in y stays 0 */
+        for (ptrdiff_t i = p->group; take[l] && i < p->size; ++i) {
             room.y[WIDE * i + l] = room.after[WIDE * i + l];
         }
     }
@@ -309,14 +308,14 @@ EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds)
     const Room room = room_of(p);
     for (ptrdiff_t round = 0; fill(p); ++round) {
         double h[WIDE], error[WIDE], growth[WIDE], angle[WIDE];
-        int ends[WIDE], take[WIDE], any = 0, why = DONE;
+        int ends[WIDE], take[WIDE], taken = 0, why = DONE;
         const Within within = {p, h};
         if (round == rounds) {
             return FULL;
         }
         rates(p, room.y, p->t, room.k);
-        begin(p);
         for (int l = 0; l < WIDE; ++l) {
+            p->h[l] = p->h[l] > 0.0 ? p->h[l] : first_step(p, l);
             h[l] = p->member[l] < 0 ? 0.0 : cut(p, l, ends + l);
         }
         stretch(room.k, p->size, h);
@@ -325,14 +324,14 @@ EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds)
         for (int l = 0; l < WIDE; ++l) {
             const int works = p->member[l] >= 0;
             take[l] = works && accepted(p, l, h[l], error[l], growth[l], angle[l], &why);
-            any |= take[l];
+            taken += take[l];
             if (works && (why != DONE || ++p->tries[l] > p->most)) {
                 p->stopped = p->t[l];
                 return why != DONE ? why : MANY;
             }
         }
-        if (any) {
-            settle(p, take);
+        if (taken) {
+            settle(p, take, taken == WIDE);
         }
         for (int l = 0; l < WIDE; ++l) {
             if (take[l]) {
