@@ -31,7 +31,7 @@ static inline void entry(const V *x, const V *y, V *z, int i, int j)
 
 #if BLOCKS
 /* Four entries at once, two rows by two columns: what is loaded is used twice, and eight sums do not wait for each other. */
-static inline void four_entries(const V *x, const V *y, int i, int j, V block[8])
+static inline __attribute__((always_inline)) void four_entries(const V *x, const V *y, int i, int j, V block[8])
 {
     const V *const p = x + i * SIZE, *const q = p + SIZE;
     V re00 = splat(0.0), re01 = re00, re10 = re00, re11 = re00, im00 = re00, im01 = re00, im10 = re00, im11 = re00;
@@ -186,7 +186,7 @@ static
 #endif
 void matrix_bracket(const V *x, const V *y, V *z)
 {
-#if ABOVE && BLOCKS && SIZE % 2 == 0
+#if SKEW && BLOCKS && SIZE % 2 == 0
     for (int i = 0; i < SIZE; i += 2) {
         for (int j = i; j < SIZE; j += 2) {
             V block[8], beyond[8], *across = block;
@@ -198,6 +198,11 @@ void matrix_bracket(const V *x, const V *y, V *z)
             const V difference[8] = {block[0] - across[0], block[1] - across[2], block[2] - across[1], block[3] - across[3],
                 block[4] + across[4], block[5] + across[6], block[6] + across[5], block[7] + across[7]};
             put_block(difference, z + i * SIZE + j);
+            if (!ABOVE && j > i) {
+                const V mirrored[8] = {-difference[0], -difference[2], -difference[1], -difference[3],
+                    difference[4], difference[6], difference[5], difference[7]};
+                put_block(mirrored, z + j * SIZE + i);
+            }
         }
     }
 #elif SKEW
