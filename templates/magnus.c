@@ -33,11 +33,10 @@ EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots)
 
 /*
  * One trajectory, steps from .. to - 1, from X0: lanes over time. X: (slots, SIZE, SIZE), `end` (SIZE, SIZE) the last state.
- * Returns the largest |a_1| of any step (the length of h u, averaged).
  */
-EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t from, ptrdiff_t to, const double *X0, ptrdiff_t slots,
+EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t from, ptrdiff_t to, const double *X0, ptrdiff_t slots,
     double *space, double *X, double *end);
-EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t from, ptrdiff_t to, const double *X0, ptrdiff_t slots,
+EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t from, ptrdiff_t to, const double *X0, ptrdiff_t slots,
     double *space, double *X, double *end)
 {
     V *work = aligned(space);
@@ -45,7 +44,7 @@ EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrd
     lay_out(u, work, &source);
     double *kept = space + LANES * (source_vectors(u->rates, u->terms) + 1), *lane_of = kept + slots * STATE;
     ptrdiff_t span[LANES], inside[LANES], left[LANES], at[LANES];
-    V state[STATE], most = splat(0.0), knot = splat(0.0), h = splat(0.0), place = splat(0.0);
+    V state[STATE], knot = splat(0.0), h = splat(0.0), place = splat(0.0);
     double prefix[LANES + 1][FULL];
     identity(state);
     for (ptrdiff_t k = 0; k < slots; ++k) {
@@ -88,7 +87,7 @@ EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrd
             V low;
             const V middle = middle_of(knot, place, h, &low);
             EACH(l, LANES) { table[l] = u->table + (u->table ? (left[l] ? at[l] + k : 0) * u->nodes * DIM : 0); }
-            step(u, &source, (int)order, middle, low, h, table, state, &most);
+            step(u, &source, (int)order, middle, low, h, table, state);
             place += 1.0;
         }
         EACH(l, LANES) {
@@ -134,19 +133,17 @@ EXPORT double magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrd
             put(moved, X + slot * PARTS * SIZE * SIZE);
         }
     }
-    return sqrt(largest(most));
 }
 
 /*
  * `count` trajectories, all steps, a lane each; X0: (count, SIZE, SIZE), or one of all where X0_stride is 0.
  * X: (count, slots, SIZE, SIZE).
  */
-EXPORT double magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t count, const double *X0, ptrdiff_t X0_stride,
+EXPORT void magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t count, const double *X0, ptrdiff_t X0_stride,
     ptrdiff_t slots, double *space, double *X);
-EXPORT double magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t count, const double *X0, ptrdiff_t X0_stride,
+EXPORT void magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t count, const double *X0, ptrdiff_t X0_stride,
     ptrdiff_t slots, double *space, double *X)
 {
-    V most = splat(0.0);
     Source source;
     lay_out(u, aligned(space), &source);
     for (ptrdiff_t row = 0; row < count; row += LANES) {
@@ -168,7 +165,7 @@ EXPORT double magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptr
             for (ptrdiff_t k = 0; k < grid->parts[s]; ++k, ++at) {
                 V low;
                 const V middle = middle_of(splat(grid->knots[s]), splat((double)k), splat(h), &low);
-                step(u, &source, (int)order, middle, low, splat(h), table, state, &most);
+                step(u, &source, (int)order, middle, low, splat(h), table, state);
                 EACH(l, LANES) { table[l] = u->table ? table[l] + u->nodes * DIM : NULL; }
             }
             if (grid->slot[s] >= 0) {
@@ -182,7 +179,6 @@ EXPORT double magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptr
             }
         }
     }
-    return sqrt(largest(most));
 }
 
 #include "magnus_solve.h"

@@ -21,7 +21,6 @@ EXPORT void magnus_many_single(const Input *u, const Grid *grid, ptrdiff_t order
 EXPORT void magnus_many_single(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t count, const float *X0, ptrdiff_t X0_stride,
     ptrdiff_t slots, float *space, float *X)
 {
-    V most = splat(0.0f);
     Source source;
     lay_out(u, aligned(space), &source);
     for (ptrdiff_t row = 0; row < count; row += LANES) {
@@ -42,7 +41,7 @@ EXPORT void magnus_many_single(const Input *u, const Grid *grid, ptrdiff_t order
                 const double t = grid->knots[s] + ((double)k + 0.5) * h;
                 const float middle = (float)t, length = (float)(h + carry);
                 carry += h - length;
-                step(u, &source, (int)order, splat(middle), splat((float)(t - middle)), splat(length), NULL, state, &most);
+                step(u, &source, (int)order, splat(middle), splat((float)(t - middle)), splat(length), NULL, state);
             }
             if (grid->slot[s] >= 0) {
                 for (int l = 0; l < LANES && row + l < count; ++l) {

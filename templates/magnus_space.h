@@ -27,7 +27,7 @@ static void lay_out(const Input *u, V *space, Source *source)
     source->slope = source->left + DIM;
     source->series = source->slope + DIM;
     source->driven = (ptrdiff_t *)(source->series + u->terms * DIM);
-    EACH(l, LANES) { source->h[l] = -1.0; }
+    EACH(l, LANES) { source->h[l] = source->turned[l] = -1.0; }
     source->start = source->start_low = splat(0.0);
     source->width = splat(1.0);
     source->factor = splat(1.0);
@@ -65,11 +65,14 @@ static void set_waves(const Input *u, Source *source, int lane, ptrdiff_t who)
         source->cosines[k][lane] = u->cosines[who * u->wave_stride + k];
         source->sines[k][lane] = u->sines[who * u->wave_stride + k];
     }
+    /* Of the rates it had, a lane keeps its weights, unless they were turned a little since. */
+    if ((who && u->rate_stride) || source->turned[lane] != source->h[lane]) {
+        source->h[lane] = -1.0;
+    }
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
         source->rate[f][lane] = u->rate[who * u->rate_stride + f];
         source->rate_low[f][lane] = (u->rate[who * u->rate_stride + f] - source->rate[f][lane]) + u->rate_low[who * u->rate_stride + f];
     }
-    source->h[lane] = -1.0;
     source->factor[lane] = u->factor[who * u->factor_stride];
 }
 

@@ -2,11 +2,11 @@
 #ifndef MAGNUS_STEP_H
 #define MAGNUS_STEP_H
 
-/* One step of every lane; keeps the largest squared |a_1|. */
+/* One step of every lane. */
 static __attribute__((noinline)) void step(const Input *u, Source *source, int order, V middle, V low, V h, const double *const *table,
-    V *state, V *most)
+    V *state)
 {
-    V a[ORDERS][DIM], omega[WORK], norm = splat(0.0);
+    V a[ORDERS][DIM], omega[WORK];
     generators(u, source, middle, low, h, table, a);
 #if COORDINATES
 #define IN_WORK a
@@ -28,8 +28,6 @@ static __attribute__((noinline)) void step(const Input *u, Source *source, int o
     } else {
         exponent4((const V (*)[WORK])IN_WORK, omega);
     }
-    EACH(i, DIM) { norm += a[0][i] * a[0][i]; }
-    *most = (V)(((norm > *most) & (I)norm) | (~(norm > *most) & (I)*most)) + 0.0 * norm;
     move(omega, state);
 }
 

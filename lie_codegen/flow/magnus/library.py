@@ -63,7 +63,7 @@ class MagnusLibrary:
         self._work = library.magnus_work
         self._work.restype, self._work.argtypes = size, (size, size, size)
         self._one, self._many, self.solve = library.magnus_one, library.magnus_many, library.magnus_solve
-        self._one.restype = self._many.restype = ctypes.c_double
+        self._one.restype = self._many.restype = None
         self._one.argtypes = (pointer, pointer, size, size, size, pointer, size, pointer, pointer, pointer)
         self._many.argtypes = (pointer, pointer, size, size, pointer, size, size, pointer, pointer)
         self.solve.restype, self.solve.argtypes = size, (pointer,)

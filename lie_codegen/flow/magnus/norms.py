@@ -27,5 +27,5 @@ def norms_of(group: MatrixGroup) -> Array:
 
 def size_of(norms: Array, vectors: Array) -> Array:
     """(...) bounds of |hat(x)|_2 of (..., n): the Frobenius norm, or the sum of those of its terms, whichever is less."""
-    square = np.einsum("...i,ij,...j->...", vectors, norms[:-1], vectors)
+    square = np.sum((vectors @ norms[:-1]) * vectors, axis=-1)
     return np.asarray(np.minimum(np.sqrt(np.maximum(square, 0.0)), np.abs(vectors) @ norms[-1]))
