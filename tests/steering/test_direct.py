@@ -16,6 +16,7 @@ from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.codegen.templates import template_folder
+from lie_codegen.steering.direct import method
 from lie_codegen.steering.direct.assemble import Manoeuvre, constant_pieces, linear_pieces
 from lie_codegen.steering.direct.chain import end as chain_end
 from lie_codegen.steering.direct.compiled import machine
@@ -392,3 +393,25 @@ def test_valleys_of_whole_turns_are_found_by_steady_starts() -> None:
         X = X @ expm(se3.hat(0.25 * np.array([*row, 1, 0, 0])))
     plan = lc.steer(se3, X, ("w1", "w2", "w3"), 5.0, drift=(0, 0, 0, 1, 0, 0), bounds=1)
     assert plan.cost <= 0.63 * 0.25 * np.sum(u**2)
+
+
+@pytest.mark.parametrize(
+    ("group", "target", "controls", "compiled"),
+    [
+        ("so3", np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), ("w1", "w2"), True),
+        ("so3", np.diag([-1.0, -1.0, 1.0]), ("w1", "w2"), True),
+        ("se2", np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]]), ("omega", "vx"), False),
+    ],
+)
+def test_controls_of_zero_are_left_where_a_symmetry_keeps_every_step_at_them(
+    group: str, target: Any, controls: tuple[str, ...], compiled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The slope vanishes at zero by hand (brackets alone lead there); the start of zero and a guess of zeros arrive as the others do."""
+    if not compiled:
+        monkeypatch.setattr(method, "machine", lambda group, controls: NumpySearch())
+    asked: dict[str, Any] = {"bounds": 20, "guess": np.zeros((4, 2)), "starts": 4, "rounds": 1, "polish": False}
+    plan = lc.steer(group, target, controls, 1.0, method="direct", **asked)
+    assert plan.details["reached"] == plan.details["starts"] == 5
+    again = lc.steer(group, target, controls, 1.0, method="direct", **asked)
+    assert again.cost == plan.cost
+    np.testing.assert_allclose(end_of_flight(plan), target, atol=1e-6)

@@ -149,3 +149,67 @@ def test_cosets_without_linear_equations_are_refused_with_the_reason() -> None:
         lc.steer(
             "su2", lc.Coset(np.eye(2), free=(2,)), (0, 1), 1.0, cost="norm2(u)", parameters={"goal_r0_": np.zeros(9)}
         )
+
+
+def conditions_at(problem: lc.OptimalControlProblem, X: np.ndarray) -> np.ndarray:
+    """The end's texts as numbers: sums of (factor)*entry and a (constant)."""
+    entries: dict[str, float] = {"": 1.0}
+    for i, j in np.ndindex(*X.shape):
+        name = f"X{i + 1}{j + 1}"
+        entries |= {name: X[i, j].real, f"{name}_re": X[i, j].real, f"{name}_im": X[i, j].imag}
+    rows = []
+    for condition in problem.data.terminal:
+        pairs = (part.partition(")") for part in str(condition.term).split(" + "))
+        rows.append(sum(float(factor[1:]) * entries[name[1:]] for factor, _, name in pairs))
+    return np.array(rows)
+
+
+def test_a_gate_on_levels_is_the_end_of_a_problem() -> None:
+    """lc.ocp(target=UpToPhase(U, levels=)): zero on e^(i f) U and anything outside, and on nothing else of the group; any order of levels."""
+    rng = np.random.default_rng(8)
+    for levels in ((0, 1), (2, 0), (1,)):
+        s = len(levels)
+        gate = unitary_group.rvs(s, random_state=s) if s > 1 else np.eye(1)
+        problem = lc.ocp(
+            "su3",
+            controls=(0, 1, 2),
+            duration=1.0,
+            intervals=3,
+            stage_cost="norm2(u)",
+            target=lc.UpToPhase(gate, levels=levels),
+        )
+        others = [level for level in range(3) if level not in levels]
+        for _ in range(4):
+            X = np.zeros((3, 3), dtype=complex)
+            X[np.ix_(levels, levels)] = np.exp(1j * rng.uniform(0, 2 * np.pi)) * gate
+            X[np.ix_(others, others)] = np.atleast_2d(
+                unitary_group.rvs(3 - s, random_state=int(rng.integers(99))) if s < 2 else 1
+            )
+            X[others[0]] /= np.linalg.det(X)
+            assert np.max(np.abs(conditions_at(problem, X))) < 1e-13
+            away = X @ expm(0.1 * lc.group("su3").hat(rng.normal(size=8)))
+            assert np.max(np.abs(conditions_at(problem, away))) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("group", "goal", "controls", "end"),
+    [
+        ("se2", lc.Position((1, 0.5)), ("omega", "vx"), lambda X: X[:2, 2] - [1, 0.5]),
+        ("so3", lc.Pointing((0, 0, 1), (1, 0, 1)), ("w1", "w2"), lambda X: X[:, 2] - np.array([1, 0, 1]) / np.sqrt(2)),
+    ],
+)
+def test_a_set_of_goals_is_the_end_of_a_problem(group: str, goal: Any, controls: tuple[str, ...], end: Any) -> None:
+    problem = lc.ocp(group, controls=controls, duration=1.0, intervals=30, stage_cost="norm2(u)", target=goal)
+    plan = problem.solve(starts=3)
+    assert np.max(np.abs(end(plan.X[-1]))) < 1e-9
+    own = lc.steer(group, goal, controls, 1.0, cost="norm2(u)", intervals=30, starts=3)
+    assert plan.cost == pytest.approx(own.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [(lc.UpToPhase(np.eye(2)), "2 phases"), (3, "name of a parameter"), (lc.Position((1, 2)), "se2, se3")],
+)
+def test_ends_that_a_problem_has_not_are_named(target: Any, said: str) -> None:
+    with pytest.raises(lc.errors.InputError, match=said):
+        lc.ocp("su2", controls=(0, 1), duration=1.0, intervals=5, stage_cost="norm2(u)", target=target)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 import sys
 import time
+from typing import Any
 
 import numpy as np
 import pytest
 
 import lie_codegen as lc
 from lie_codegen.runtime import patience
+from lie_codegen.steering.choice import asks_direct
+from lie_codegen.steering.methods import OPEN_LOOP, solver_of
 
 TASK = ("so3", [0.1, 0.2, 0.3], ("w1", "w2"), 1.0)
 
@@ -81,3 +84,20 @@ def test_long_work_says_so_where_somebody_watches(monkeypatch: pytest.MonkeyPatc
     patience.shows_progress(lambda: time.sleep(0.2))()
     assert "0 s" in seen.getvalue()
     assert seen.getvalue().endswith("\r")
+
+
+@pytest.mark.parametrize("torques", [False, True])
+@pytest.mark.parametrize(
+    "option", [{"rest": True}, {"via": [(0.5, (0.1, 0.1, 0.3))]}, {"periodic": True}, {"velocity_bounds": 0.9}]
+)
+def test_what_direct_has_not_is_refused_with_the_method_that_has_it_and_auto_asks_that(
+    option: dict[str, Any], torques: bool
+) -> None:
+    asked = {"bounds": 2.0, **({"dynamics": "second_order", "inertia": (1.0, 2.0, 3.0)} if torques else {}), **option}
+    controls, (name,) = ("w1", "w2", "w3"), option
+    with pytest.raises(lc.errors.SteeringInputError, match=f'"transcription" takes {name}, as method="auto" does here'):
+        lc.steer("so3", (0.1, 0.2, 0.3), controls, 3.0, "direct", **asked)
+    assert not asks_direct("auto", np.eye(3), controls, asked)
+    assert solver_of(OPEN_LOOP, "auto", asked) is OPEN_LOOP["transcription"]
+    with pytest.raises(lc.errors.SteeringInputError, match=f'"transcription" takes {name}, without seed'):
+        lc.steer("so3", (0.1, 0.2, 0.3), controls, 3.0, "direct", **asked, seed=3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 from lie_codegen.errors import SteeringInputError
@@ -80,7 +81,21 @@ def torque_options() -> set[str]:
 def _refuse_others(what: str, known: set[str], options: Mapping[str, Any]) -> None:
     unknown = sorted(set(options) - known)
     if unknown:
-        raise SteeringInputError(f"{what} has no option {', '.join(unknown)}; it has {', '.join(sorted(known))}")
+        raise SteeringInputError(
+            f"{what} has no option {', '.join(unknown)}; it has {', '.join(sorted(known))}{_elsewhere(options, unknown)}"
+        )
+
+
+def _elsewhere(options: Mapping[str, Any], unknown: Sequence[str]) -> str:
+    """Where options are that the direct method has not, if it is one place."""
+    from lie_codegen.steering.transcription.numbers import Options
+
+    has = {each.name for each in fields(Options)} | {"progress"}
+    if not has.issuperset(unknown):
+        return ""
+    others = sorted(set(options) - has)
+    beside = f", without {', '.join(others)}" if others else ', as method="auto" does here'
+    return f'. method="transcription" takes {", ".join(unknown)}{beside}'
 
 
 def _refuse_idle(where: str, options: Mapping[str, Any]) -> None:

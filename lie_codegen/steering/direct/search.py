@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
-from lie_codegen.steering.direct.starts import starts, with_free_slots
+from lie_codegen.steering.direct.starts import kicked, starts, still, with_free_slots
 
 #: Starts of a round that must arrive before another round is not tried.
 _PLENTY = 4
@@ -100,7 +100,12 @@ def search(
         # with any phase nearly every start for a gate arrives, but seldom at the cheapest phase: first each phase has its starts, and
         # where arriving is all, or the phases refuse, the starts choose for themselves
         free = len(task.end.phases) > 1 and (settings.descend_iterations == 0 or round_ % 2 == 1)
-        found = machine.reach(programme, replace(goal, free_phase=free), u, patient)
+        goal = replace(goal, free_phase=free)
+        found = machine.reach(programme, goal, u, patient)
+        if round_ == 0:
+            # no controls, and those that were given: neither is random
+            given = np.arange((0 if guesses is None else variants * len(guesses)) + 1)
+            found = _roused(task, programme, machine, goal, found, given, budget.seed, patient)
         if free:
             variant = _nearest_variant(task, variant, found.phase)
         total += len(u)
@@ -135,6 +140,40 @@ def search(
     lower = machine.descend(programme, task.goal(variant[arrived]), u[arrived], settings)
     say(f"descent from {len(arrived)} starts: {int(np.max(lower.used))} steps at most")
     return _best(lower, variant[arrived], total, reached, tuple(tried))
+
+
+def _roused(
+    task: Manoeuvre,
+    programme: Programme,
+    machine: Machine,
+    goal: Goal,
+    found: Reached,
+    lanes: Array,
+    seed: int,
+    settings: Settings,
+) -> Reached:
+    """The same, but for those of the lanes that stand still short of the goal: these go on from a little aside.
+
+    A target that a symmetry maps to itself is never left by steps that keep the symmetry (no controls, a quarter turn about the third
+    axis of SO(3) by the other two; every gate whose matrix is real).
+    """
+    enough = threshold(task, settings)
+    if int(np.sum(found.size <= enough)) >= settings.wanted:
+        return found
+    lanes = lanes[found.size[lanes] > enough]
+    if not len(lanes):
+        return found
+    _, r, J = machine.linearise(programme, replace(goal, value=goal.value[lanes]), found.u[lanes])
+    lanes = lanes[still(programme, found.u[lanes], r, J)]
+    if not len(lanes):
+        return found
+    again = machine.reach(
+        programme, replace(goal, value=goal.value[lanes]), kicked(task, found.u[lanes], seed), settings
+    )
+    parts = {each.name: np.array(getattr(found, each.name)) for each in fields(Reached)}
+    for name, values in parts.items():
+        values[lanes] = getattr(again, name) + (found.used[lanes] if name == "used" else 0)
+    return Reached(**parts)
 
 
 def _nearest_variant(task: Manoeuvre, variant: Array, ahead: Array) -> Array:

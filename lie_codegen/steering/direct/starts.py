@@ -7,12 +7,15 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.flow.second_kind_coordinates import element_coordinates
 from lie_codegen.steering.direct.assemble import Manoeuvre
+from lie_codegen.steering.direct.programme import Programme
 
 #: Sizes of the waves, in units of the bounds: larger ones start at the bounds and stay there (measured on two-qubit gates).
 _SIZES = (0.3, 0.15, 0.6, 0.1)
 _WAVES = 4
 #: White noise on steady controls, which may be as large as the bounds.
 _UNSTEADY = 0.2
+#: Size of a kick in units of the bounds, and the gradient, relative to |J| |r|, below which a lane stands still.
+_KICK, _STILL = 0.03, 1e-6
 
 
 def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> Array:
@@ -38,6 +41,25 @@ def starts(task: Manoeuvre, pieces: int, lanes: int, seed: int, round_: int) -> 
     if round_ == 0:
         found[0] = 0
     return np.clip(found, task.low, task.high)
+
+
+def still(programme: Programme, u: Array, r: Array, J: Array) -> Array:
+    """(lanes,) whether no small step within the bounds comes nearer to the goal: J' r vanishes but for what pushes out of the bounds."""
+    slope = np.einsum("lnc,ln->lc", J, r).reshape(u.shape)
+    held = ((u <= programme.low) & (slope > 0)) | ((u >= programme.high) & (slope < 0))
+    left = np.linalg.norm(np.where(held, 0.0, slope), axis=(1, 2))
+    return np.asarray(left <= _STILL * np.linalg.norm(J, axis=(1, 2)) * np.linalg.norm(r, axis=1))
+
+
+def kicked(task: Manoeuvre, u: Array, seed: int) -> Array:
+    """Controls (lanes, S, m), a little aside: off a symmetry that every step from them would keep."""
+    before, after = task.free_slots
+    _, half = _box(task)
+    found = np.array(u)
+    own = found[:, before : u.shape[1] - after]
+    own += _KICK * half * np.random.default_rng([seed, 1, *u.shape]).uniform(-1, 1, own.shape)
+    np.clip(own, task.low, task.high, out=own)
+    return found
 
 
 def with_free_slots(task: Manoeuvre, u: Array, seed: int) -> Array:

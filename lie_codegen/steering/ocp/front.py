@@ -14,9 +14,11 @@ from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.runtime.patience import shows_progress
+from lie_codegen.steering.goals import GoalSet
 from lie_codegen.steering.ocp.bounds import bounds_of
 from lie_codegen.steering.ocp.checks import check_problem
 from lie_codegen.steering.ocp.dynamics import dynamics_of
+from lie_codegen.steering.ocp.goal_terms import fixed_terms
 from lie_codegen.steering.ocp.layout import Shape, check_distinct, layout
 from lie_codegen.steering.ocp.problem import OptimalControlProblem
 from lie_codegen.steering.ocp.problem_data import INTEGRATORS, QUADRATURES, ProblemData
@@ -45,7 +47,7 @@ def ocp(
     terminal_cost: Terms | None = None,
     constraints: Terms = (),
     terminal: Terms = (),
-    target: str | None = None,
+    target: str | GoalSet | None = None,
     bounds: Any = None,
     parameters: Mapping[str, Any] | None = None,
     quadrature: str = "trapezoid",
@@ -81,7 +83,9 @@ def ocp(
             `residual`, is r with the cost |r|^2 / 2; a Kernel with the output `cost` is a scalar; sequences may mix them.
         constraints: g, entry by entry; a text may be "a <= b", "a >= b" or "a <= b <= c". Those without a control hold at the end too.
         terminal: e, entry by entry. Ask for a pose by the entries of X - Xd: entries of skew(Xd' X) vanish at half a turn too.
-        target: name of a parameter, an element of the group, that X_N must equal.
+        target: name of a parameter, an element of the group, that X_N must equal; or a set of goals that X_N must be in: a `Pointing`, a
+            `Position`, a `Coset`, a gate on some levels (`UpToPhase(U, levels=)`), written by linear equations in the entries of X
+            (`error` is what is left of them).
         bounds: of the controls: a number b for -b <= u <= b, a pair (low, high), or {input: either}.
         parameters: names and shapes; () for a number, "X" for an element of the group.
         quadrature: "trapezoid", "left" (sum of h l(x_k, u_k)), or "simpson".
@@ -96,7 +100,13 @@ def ocp(
     where = f"ocp({group.name})"
     element: Shape = (group.degree, group.degree, 2) if group.is_complex else (group.degree, group.degree)
     given = dict(parameters or {})
-    if target is not None:
+    if isinstance(target, GoalSet):
+        terminal = (*sequence_of(terminal), *fixed_terms(group, target, f"{where}: target"))
+    elif target is not None:
+        if not isinstance(target, str):
+            raise InputError(
+                f"{where}: target is the name of a parameter, or a Pointing, Position, Coset or UpToPhase, got {target!r:.80}"
+            )
         if target not in given:
             given[target] = "X"
         terminal = (*sequence_of(terminal), f"X - {target}")

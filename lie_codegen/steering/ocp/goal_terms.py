@@ -20,7 +20,7 @@ from lie_codegen.flow.elements import group_element
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.steering.goals import Coset, Pointing, Position, UpToPhase, cosets
+from lie_codegen.steering.goals import Coset, Pointing, Position, UpToPhase, cosets, end_of
 
 #: The name of the parameter that an element is.
 GOAL = "steer_goal"
@@ -28,6 +28,8 @@ GOAL = "steer_goal"
 _RANK = 1e-9
 #: Steps of Gauss and Newton towards the nearest element of a coset, from how many places, and when two elements are one.
 _STEPS, _PLACES, _MET = 60, 12, 1e-12
+#: Factors that are rounding.
+_NOTHING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,37 @@ def goal_terms(group: MatrixGroup, target: Any, where: str) -> GoalTerms:
         fixed = {f"goal_{kind}{k}": each for k, pair in enumerate(pairs) for kind, each in zip("ve", pair, strict=True)}
         return GoalTerms(tuple(f"X*goal_v{k} - goal_e{k}" for k in range(kept.shape[1])), fixed, T, free)
     return GoalTerms(*_rows(group, T, _outside(group, free, where)), T, free)
+
+
+def fixed_terms(group: MatrixGroup, target: Any, where: str) -> tuple[str, ...]:
+    """The conditions of a set of goals as texts with its numbers in them, for a problem whose goal does not change.
+
+    Raises:
+        SteeringInputError: a gate with several phases, or as `goal_terms`.
+        Others as `goal_terms`.
+    """
+    phases = len(end_of(group, target, where).phases)
+    if phases > 1:
+        raise SteeringInputError(
+            f"{where}: the gate may end in {phases} phases, each an element of {group.name}, and a problem has one end: "
+            "lc.steer(..., lc.UpToPhase(U), cost=) tries each of them; or name a parameter, target=, and give it e^(i f) U"
+        )
+    elements, free = cosets(group, target, where)
+    T, kept = elements[0], _kept_vectors(group, free)
+    if kept is None:
+        normals = _normals(group, T, _outside(group, free, where))
+    else:
+        # X v = T v, an entry at a time: the row e_i v'
+        normals = np.einsum("ia,bk->kiab", np.eye(group.degree), kept).reshape(-1, group.degree, group.degree)
+    factors, numbers, constants = _linear(group, normals)
+    held = constants - np.real(np.einsum("rij,ij->r", normals.conj(), T))
+    terms = []
+    for row, constant in zip(numbers, held, strict=True):
+        if np.any(np.abs(row) > _NOTHING):
+            pairs = zip(row, factors, strict=True)
+            parts = [f"({float(number)!r})*{factor}" for number, factor in pairs if abs(number) > _NOTHING]
+            terms.append(" + ".join([*parts, f"({float(constant)!r})"]))
+    return tuple(terms)
 
 
 def _kept_vectors(group: MatrixGroup, free: Array) -> Array | None:
@@ -126,31 +159,39 @@ def _span(matrices: Array) -> Array:
     return np.asarray(across[: int(np.sum(sizes > _RANK * sizes[0]))])
 
 
-def _rows(group: MatrixGroup, T: Array, outside: Array) -> tuple[tuple[str, ...], dict[str, Array]]:
-    """<N, T^-1 X> = 0 for each row N as a text in the entries of X that vary, with the numbers as parameters."""
-    # Re tr(N^H T^-1 X) = Re tr((T^-H N)^H X)
-    moved = np.linalg.inv(T).conj().T @ _matrices(outside, group)
+def _normals(group: MatrixGroup, T: Array, outside: Array) -> Array:
+    """(r, d, d) N with Re tr(N^H X) = 0 where T^-1 X is orthogonal to the rows."""
+    # Re tr(M^H T^-1 X) = Re tr((T^-H M)^H X)
+    return np.asarray(np.linalg.inv(T).conj().T @ _matrices(outside, group))
+
+
+def _linear(group: MatrixGroup, normals: Array) -> tuple[list[str], Array, Array]:
+    """Re tr(N^H X) in the entries of X that vary: their names (f,), the factors (r, f), and what the others add (r,)."""
     entries = list(varying_entries(group))
     names = [f"X{i + 1}{j + 1}" for i, j in entries]
     # entries that no element moves are those of the identity: a constant of each condition
     fixed = np.eye(group.degree)
     for i, j in entries:
         fixed[i, j] = 0
-    constant = np.real(np.einsum("rij,ij->r", moved.conj(), fixed))
-    kinds: tuple[tuple[str, Array], ...] = (("", moved.real),)
+    constants = np.real(np.einsum("rij,ij->r", normals.conj(), fixed))
+    kinds: tuple[tuple[str, Array], ...] = (("", normals.real),)
     if group.is_complex:
-        kinds = (("_re", moved.real), ("_im", moved.imag))
+        kinds = (("_re", normals.real), ("_im", normals.imag))
+    numbers = [[part[r, i, j] for _, part in kinds for i, j in entries] for r in range(len(normals))]
+    return [f"{name}{kind}" for kind, _ in kinds for name in names], np.array(numbers), constants
+
+
+def _rows(group: MatrixGroup, T: Array, outside: Array) -> tuple[tuple[str, ...], dict[str, Array]]:
+    """<N, T^-1 X> = 0 for each row N as a text in the entries of X that vary, with the numbers as parameters."""
+    factors, numbers, constants = _linear(group, _normals(group, T, outside))
     values, texts = {}, []
-    for r in range(len(outside)):
-        numbers = [part[r, i, j] for _, part in kinds for i, j in entries]
-        factors = [f"{name}{kind}" for kind, _ in kinds for name in names]
-        numbers.append(constant[r])
-        if not np.any(np.abs(numbers[:-1]) > 1e-14):
+    for r, (row, constant) in enumerate(zip(numbers, constants, strict=True)):
+        if not np.any(np.abs(row) > _NOTHING):
             continue
         name = f"goal_r{r}_"
-        values[name] = np.array(numbers)
+        values[name] = np.array([*row, constant])
         terms = [f"{name}{k}*{factor}" for k, factor in enumerate(factors, start=1)]
-        texts.append(" + ".join([*terms, f"{name}{len(numbers)}"]))
+        texts.append(" + ".join([*terms, f"{name}{len(row) + 1}"]))
     return tuple(texts), values
 
 
