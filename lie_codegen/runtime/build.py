@@ -15,7 +15,7 @@ from lie_codegen.errors import CacheError, CodegenError
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_door import Attempt, compiled_entry, request_key
 from lie_codegen.runtime.cache_folder import note_not_loaded, usable_folder
-from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, warn_no_compiler
+from lie_codegen.runtime.compiler import Compiler, find_compilers, flags_for, lane_flags, warn_no_compiler
 from lie_codegen.runtime.compiling import compile_entry
 from lie_codegen.runtime.digests import cpu_identity, digest
 from lie_codegen.runtime.extension import prepare_extension
@@ -182,7 +182,7 @@ def _fill(folder: Path, key: str, sources: LibrarySources, compiler: Compiler, f
         sources.signatures,
         sources.notes,
     )
-    keep_sources(entry, sources.files, sources.main, flags, compiler)
+    keep_sources(entry, sources.files, sources.main, lane_flags(sources.statements), compiler)
     return entry
 
 

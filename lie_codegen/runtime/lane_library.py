@@ -70,8 +70,8 @@ class LaneLibrary:
             raise ValueError("the sources of the lanes are gone or damaged")
         compilers = find_compilers()
         compiler = next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
-        key = digest(["lanes", home.name, compiler.identity, *more_flags])
         flags = (*sources["flags"], *more_flags)
+        key = digest(["lanes", home.name, compiler.identity, *flags])
         entry = cache.find_entry(folder, key)
         if entry is None:
             try:

@@ -27,7 +27,7 @@ from lie_codegen.runtime import build, cache, cache_folder, compiler, entry_libr
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
-from lie_codegen.runtime.compiler import FLAGS, find_compilers, flags_for
+from lie_codegen.runtime.compiler import FLAGS, find_compilers, flags_for, lane_flags
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A child imports the package, the helpers of the tests, and this file.
@@ -326,12 +326,14 @@ def test_the_least_recently_used_go_first(home: Path, monkeypatch: pytest.Monkey
 
 
 def test_flags_never_change_the_arithmetic_of_the_process() -> None:
-    for flags in (flags_for(10), flags_for(10**6)):
+    for flags in (flags_for(10), flags_for(10**6), lane_flags(1000)):
         assert "-ffp-contract=off" in flags
         assert not any("fast" in flag or "unsafe" in flag for flag in flags)
     assert flags_for(10)[0] == "-O2"
     assert flags_for(10**6)[0] == "-O1"
     assert set(FLAGS) < set(flags_for(1))
+    assert set(flags_for(1000)) < set(lane_flags(1000))
+    assert lane_flags(10) == flags_for(10)
 
 
 def test_the_ladder(tmp_path: Path) -> None:
