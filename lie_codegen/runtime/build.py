@@ -135,7 +135,7 @@ def _request(namespace: str | None, definition: str, options: Mapping[str, Any],
 
 
 def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler], requests: Sequence[str]) -> Library:
-    flags = flags_for(sources.statements)
+    flags, over_lanes = flags_for(sources.statements), lane_flags(sources.statements)
 
     def attempt(folder: Path, number: int, compiler: Compiler) -> cache.Entry:
         # The C text itself is the key: another request for the same text, from another version, compiles nothing.
@@ -143,7 +143,7 @@ def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler
             {
                 "files": dict(sources.files),
                 "signatures": [signature.to_json() for signature in sources.signatures],
-                "flags": flags,
+                "flags": [flags, over_lanes],
                 "compiler": compiler.identity,
                 "cpu": cpu_identity(),
             }

@@ -40,8 +40,9 @@ NATIVE = "-march=native"
 #: Above this many statements in one kernel -O2 compiles a quarter longer than -O1 and gains nothing (measured with gcc 12 on
 #: kernels of su3, sp4, su4 and so6: 600 to 3,000 statements run 1 to 5 % slower with -O1, 5,900 to 20,500 equally fast).
 LARGE = 5_000
-#: Statements between which lanes are compiled with gcc's first scheduling (clang knows the flag and passes it over): without it values of a long body wait in memory for lack of
-#: registers (measured with gcc 12, AVX2: 1,660 statements take .78 of the time, 610 .9; 3,500 would compile 2.6 times as long).
+#: Statements between which lanes are compiled with gcc's first scheduling (clang knows the flag and passes it over): without it
+#: values of a long body wait in memory for lack of registers (measured with gcc 12, AVX2: 1,660 statements take .78 of the time, 610
+#: .9; 3,500 would compile 2.6 times as long).
 SCHEDULED = (400, 2_000)
 _SCHEDULING = "-fschedule-insns"
 #: Seconds that a compiler is given unless LIE_CODEGEN_COMPILE_SECONDS says otherwise; the longest kernel of the tests takes thirty.
