@@ -24,8 +24,8 @@ from lie_codegen.runtime.threads import share_out
 _STEPS, _FIRST_STEPS = 4096, 256
 #: Members below which a thread costs more than it does.
 _BLOCK = 64
-#: Members of the pilot, and how many times more than the worst of them others may err.
-_PILOT, _MARGIN = 16, 4.0
+#: Members of the pilot, and how many times more than the worst of them others may err: with steps of their own one of 10,000 erred 16 times as much.
+_PILOT, _MARGIN = 16, 16.0
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 16.0
 #: Times at which two runs of a single member of a steady system are compared: the longer steps need not end at all that were asked for.
