@@ -7,12 +7,14 @@
  * One member; many go on lanes, with pair_lanes.c.
  *
  * States are wanted at given times. A step ends there if two or more such times lie in it; a single one is reached by a step
- * of its own beside, since the interpolant of the pair errs a hundred times more than its steps.
+ * of its own beside, since the interpolant of the pair errs a hundred times more than its steps. Where xi is part of y and the rate does not
+ * read t, steps go as they like, and pair_between interpolates over several of them (pair_hermite.h).
  */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
+#include "pair_hermite.h"
 #include "pair_step.h"
 
 #if defined(_WIN32)
@@ -35,9 +37,13 @@ typedef struct {
     ptrdiff_t count, next;          /* of them; those that are done */
     double *X_out, *y_out;          /* count x packed, count x size */
     double *knot_t, *knot_h, *knot_X, *knot_y; /* accepted steps; NULL if not wanted */
+    double *knot_slope, *knot_theta; /* y' at their beginning, Theta at their end; NULL if nothing lies between them; or with a knot more, the end */
     ptrdiff_t room, knots;
     double *work;                   /* (STAGES + 4) vectors, each padded to whole eights, + 2 packed */
     ptrdiff_t steps, rejected, evaluations;
+    Brackets brackets;              /* of pair_between, as what follows: of the algebra, if xi are the entries of y behind Theta */
+    double *dense;                  /* room for `between_size` */
+    double between;                 /* the largest error that an interpolated state was found to have, over what steps are allowed */
 } Pair;
 
 /* The parts of `work`. */
@@ -149,6 +155,20 @@ static void keep(Pair *p, const double *X, const double *y)
     ++p->next;
 }
 
+/* Where the step of length h began, with its first slope; Theta at its end. */
+static void mark(Pair *p, double h, const double *slope, const double *theta)
+{
+    const ptrdiff_t at = p->knots;
+    p->knot_t[at] = p->t;
+    p->knot_h[at] = h;
+    memcpy(p->knot_X + at * p->packed, p->X, (size_t)p->packed * sizeof(double));
+    memcpy(p->knot_y + at * p->size, p->y, (size_t)p->size * sizeof(double));
+    if (p->knot_slope) {
+        memcpy(p->knot_slope + at * p->size, slope, (size_t)p->size * sizeof(double));
+        memcpy(p->knot_theta + at * p->group, theta, (size_t)p->group * sizeof(double));
+    }
+}
+
 /* On to the last time, or until there is no room for more knots (FULL: call again). */
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps);
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
@@ -192,10 +212,7 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
             continue;
         }
         if (p->knot_t) {
-            p->knot_t[p->knots] = p->t;
-            p->knot_h[p->knots] = h;
-            memcpy(p->knot_X + p->knots * p->packed, p->X, (size_t)p->packed * sizeof(double));
-            memcpy(p->knot_y + p->knots * p->size, p->y, (size_t)p->size * sizeof(double));
+            mark(p, h, k, after);
             ++p->knots;
         }
         ++p->steps;
@@ -224,27 +241,222 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
         }
         fresh = 1;
     }
+    if (p->knot_slope) {
+        rates(p, p->X, p->y, p->t, k);
+        mark(p, 0.0, k, p->y);
+    }
     return DONE;
 }
 
-/* Fresh steps from knots: the state `part` of the way through each step, part in [0, 1]. */
-EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out);
-EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *knot, const double *part, double *X_out, double *y_out)
+/* The state of one member `part` of the way through the step from a knot, by a step of its own. */
+static void afresh(Pair *p, ptrdiff_t from, double part, double *X_out, double *y_out)
 {
     const Room room = room_of(p);
+    const double *X = p->knot_X + from * p->packed, t = p->knot_t[from];
     double *y = room.more;
-    memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
     memset(y, 0, (size_t)wide(p) * sizeof(double));
+    memcpy(y, p->knot_y + from * p->size, (size_t)p->size * sizeof(double));
+    memcpy(X_out, X, (size_t)p->packed * sizeof(double));
+    rates(p, X, y, t, room.k);
+    advance(p, X, y, t, part * p->knot_h[from], room.k, room.stage, room.after);
+    settle(p, X_out, room.after);
+    memcpy(y_out, room.after, (size_t)p->size * sizeof(double));
+}
+
+/* States so many parts of the way through steps, part in [0, 1]. */
+EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *from, const double *part, double *X_out, double *y_out);
+EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *from, const double *part, double *X_out, double *y_out)
+{
+    const Room room = room_of(p);
+    memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
     for (ptrdiff_t c = 0; c < count; ++c) {
-        const double *X = p->knot_X + knot[c] * p->packed, t = p->knot_t[knot[c]];
-        double *to = X_out + c * p->packed;
-        memcpy(to, X, (size_t)p->packed * sizeof(double));
-        memcpy(y, p->knot_y + knot[c] * p->size, (size_t)p->size * sizeof(double));
-        rates(p, X, y, t, room.k);
-        advance(p, X, y, t, part[c] * p->knot_h[knot[c]], room.k, room.stage, room.after);
-        settle(p, to, room.after);
-        memcpy(y_out + c * p->size, room.after, (size_t)p->size * sizeof(double));
+        afresh(p, from[c], part[c], X_out + c * p->packed, y_out + c * p->size);
     }
+}
+
+/* Doubles that `dense` needs: for pair_between. */
+EXPORT ptrdiff_t between_size(ptrdiff_t group, ptrdiff_t size);
+EXPORT ptrdiff_t between_size(ptrdiff_t group, ptrdiff_t size)
+{
+    return fours(size - group) * NODES + fours(group) * TURN_NODES + 9 * group + turn_room(group) + 2 * (fours(group) + fours(size - group));
+}
+
+/* Newton's polynomials about one step. */
+typedef struct {
+    double place[KNOTS], turn_place[TURNS]; /* of knots, in lengths of the step from its beginning */
+    double *c, *turn, *spare;               /* coefficients of the vectors, and of Theta in the chart of the knot `centre`; nine of Theta, and more room */
+    ptrdiff_t centre;
+} Between;
+
+/* Of step s of so many: the knots s, s + 1 first, then those beside, the nearer before the farther. */
+static void prepare_between(const Pair *p, ptrdiff_t steps, ptrdiff_t s, Between *b)
+{
+    const ptrdiff_t n = p->group, rest = p->size - n;
+    const double h = p->knot_h[s];
+    Jet jets[KNOTS], turns[TURNS];
+    ptrdiff_t low = s, high = s + 1;
+    double below = 0.0, above = 1.0;
+    for (int j = 0; j < KNOTS; ++j) {
+        ptrdiff_t at = j ? high : low;
+        b->place[j] = j ? above : below;
+        if (j > 1) { /* one further on the side that is nearer, or that is there at all */
+            const double down = low > 0 ? below - p->knot_h[low - 1] / h : -INFINITY, up = high < steps ? above + p->knot_h[high] / h : INFINITY;
+            if (-down < up - 1.0) {
+                at = --low;
+                b->place[j] = below = down;
+            } else {
+                at = ++high;
+                b->place[j] = above = up;
+            }
+        }
+        jets[j].of[0] = p->knot_y + at * p->size + n;
+        jets[j].of[1] = p->knot_slope + at * p->size + n;
+    }
+    newton_2(rest, b->place, jets, h, b->c);
+    b->centre = s > 0 ? s : 1;
+    for (int j = 0; j < TURNS; ++j) { /* the middle, the other end of the step, the knot on the far side */
+        const ptrdiff_t c = b->centre, at = j == 0 ? c : (j == 1) == (c == s) ? c + 1 : c - 1;
+        double *theta = b->spare + 3 * j * n, *first = theta + n, *second = first + n;
+        const double *xi = p->knot_y + at * p->size + n, *xi_dot = p->knot_slope + at * p->size + n;
+        for (ptrdiff_t i = 0; i < n; ++i) {
+            theta[i] = at == c ? 0.0 : at > c ? p->knot_theta[c * n + i] : -p->knot_theta[at * n + i];
+        }
+        if (j) {
+            turn_jet(&p->brackets, theta, xi, xi_dot, 0.1 * (p->atol + p->rtol) / h, first, second, b->spare + 9 * n);
+        } else {
+            memcpy(first, xi, (size_t)n * sizeof(double));
+            memcpy(second, xi_dot, (size_t)n * sizeof(double));
+        }
+        turns[j].of[0] = theta;
+        turns[j].of[1] = first;
+        turns[j].of[2] = second;
+        b->turn_place[j] = at == s ? 0.0 : at == s + 1 ? 1.0 : at < s ? -p->knot_h[at] / h : 1.0 + p->knot_h[s + 1] / h;
+    }
+    newton_3(n, b->turn_place, turns, h, b->turn);
+}
+
+/*
+ * States at all wanted times, which lie within the `steps` steps of a run that is done. What is left away with the last terms
+ * of an interpolant errs more than it does; where that is more than `most` times what a step may err, a step of its own goes there.
+ */
+EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most);
+EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
+{
+    const Room room = room_of(p);
+    const ptrdiff_t n = p->group, rest = p->size - n;
+    Between b;
+    ptrdiff_t s = 0, made = -1;
+    b.c = p->dense;
+    b.turn = b.c + NODES * fours(rest);
+    b.spare = b.turn + TURN_NODES * fours(n);
+    memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
+    for (ptrdiff_t w = 0; w < p->count; ++w) {
+        const double t = p->times[w];
+        double *X = p->X_out + w * p->packed, *y = p->y_out + w * p->size, part, error = INFINITY;
+        while (s + 1 < steps && p->knot_t[s + 1] <= t) {
+            ++s;
+        }
+        part = w + 1 == p->count ? 1.0 : (t - p->knot_t[s]) / p->knot_h[s];
+        if (steps + 1 >= KNOTS) {
+            double *theta = b.spare + 9 * n + turn_room(n), *behind = theta + fours(n), *last = behind + fours(rest), *after = last + fours(n);
+            if (made != s) {
+                prepare_between(p, steps, s, &b);
+                made = s;
+            }
+            newton_3_at(n, b.turn_place, b.turn, part, theta, last);
+            newton_2_at(rest, b.place, b.c, part, behind, after);
+            error = 0.0;
+            for (ptrdiff_t i = 0; i < n; ++i) {
+                const double e = fabs(last[i]) / (p->atol + p->rtol);
+                error = e > error || e != e ? e : error;
+            }
+            for (ptrdiff_t i = 0; i < rest; ++i) {
+                const double e = fabs(after[i]) / (p->atol + p->rtol * fabs(behind[i]));
+                error = e > error || e != e ? e : error;
+            }
+            if (error <= most) {
+                memcpy(X, p->knot_X + b.centre * p->packed, (size_t)p->packed * sizeof(double));
+                memset(y, 0, (size_t)n * sizeof(double));
+                memcpy(y + n, behind, (size_t)rest * sizeof(double));
+                settle(p, X, theta);
+                p->between = error > p->between ? error : p->between;
+                continue;
+            }
+        }
+        afresh(p, s, part, X, y);
+    }
+}
+
+/* From the start, X then y, to the last time at this tolerance, and the states at all times. */
+static ptrdiff_t whole(Pair *p, const double *start, const double *tolerance, ptrdiff_t most_steps, double most)
+{
+    const double *times = p->times, t = p->t;
+    double *X = p->X_out, *y = p->y_out;
+    const ptrdiff_t count = p->count, last = count - 1;
+    ptrdiff_t status;
+    memcpy(p->X, start, (size_t)p->packed * sizeof(double));
+    memcpy(p->y, start + p->packed, (size_t)p->size * sizeof(double));
+    p->rtol = tolerance[0];
+    p->atol = tolerance[1];
+    p->h = p->t_low = p->between = 0.0;
+    p->next = p->steps = p->rejected = 0;
+    p->times += last;
+    p->X_out += last * p->packed;
+    p->y_out += last * p->size;
+    p->count = 1;
+    status = pair_run(p, most_steps);
+    p->times = times;
+    p->X_out = X;
+    p->y_out = y;
+    p->count = count;
+    if (status == DONE) {
+        pair_between(p, p->steps, most);
+    }
+    p->t = t;
+    return status;
+}
+
+/* The largest |a - b|, or |a| alone; NaN shows. */
+static double largest(ptrdiff_t n, const double *a, const double *b)
+{
+    double most = 0.0;
+    for (ptrdiff_t i = 0; i < n; ++i) {
+        const double d = fabs(a[i] - (b ? b[i] : 0.0));
+        most = d > most || d != d ? d : most;
+    }
+    return most;
+}
+
+/*
+ * A run of one member at each of two tolerances (relative, absolute; of the first run, of the second): the states of the first in
+ * `other`, first those of X, and how far they are from those of the second: of X, of y, the size of the second, and the steps of the first.
+ */
+EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, double *other, double *found);
+EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, double *other, double *found)
+{
+    double *X = p->X_out, *y = p->y_out;
+    const ptrdiff_t elements = p->count * p->packed, vectors = p->count * p->size;
+    ptrdiff_t status;
+    double a, b;
+    p->X_out = other;
+    p->y_out = other + elements;
+    status = whole(p, start, tolerances, most_steps, most);
+    p->X_out = X;
+    p->y_out = y;
+    if (status != DONE) {
+        return status;
+    }
+    found[3] = (double)p->steps;
+    p->evaluations = 0;
+    status = whole(p, start, tolerances + 2, most_steps, most);
+    if (status == DONE) {
+        found[0] = largest(elements, other, X);
+        found[1] = largest(vectors, other + elements, y);
+        a = largest(elements, X, NULL);
+        b = largest(vectors, y, NULL);
+        found[2] = a > b ? a : b;
+    }
+    return status;
 }
 
 /*

@@ -30,7 +30,10 @@ def loop_system(loop: Loop, library: Library, numbers: Mapping[str, Array]) -> S
     reach = min(reach_of(move.group, closed=move.derivation.closed_exponential) for move in moves)
     turns = sum(move.group.dim for move in moves)
     given = tuple(numbers[port.name] for port in library.loop_rate.inputs[3:])
-    return System(library.loop_rate, library.loop_settle, turns, reach, given, steady=loop.steady)
+    # the velocity is part of the state of a body; that of an element of the law's own is what the law says at the time
+    alone = loop.plant.order == 2 and len(moves) == 1
+    algebra = moves[0].group.algebra if alone and loop.steady else None
+    return System(library.loop_rate, library.loop_settle, turns, reach, given, steady=loop.steady, algebra=algebra)
 
 
 def _system(run: Run) -> System:
@@ -51,15 +54,23 @@ def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
         ComputationError: as `integrate`.
     """
     system = _system(run)
-    elements, vectors = columns(run.loop)
-    start = run.start
-    y0 = np.concatenate([np.zeros((len(start), system.group)), start[:, vectors]], axis=1)
+    X0, behind = _parted(run.loop, run.start)
+    y0 = np.zeros((len(behind), system.group + behind.shape[1]))
+    y0[:, system.group :] = behind
     found = integrate(
-        system, np.ascontiguousarray(start[:, elements]), y0, run.times, rtol=_ROUNDING, atol=tolerance,
+        system, np.ascontiguousarray(X0), y0, run.times, rtol=_ROUNDING, atol=tolerance,
         where=f"closed_loop({run.loop.plant.namespace})", threads=run.threads,
     )  # fmt: skip
     states = joined(run.loop, found.X, found.y)
     return (states if run.many else states[:, 0]), found
+
+
+def _parted(loop: Loop, states: Array) -> tuple[Array, Array]:
+    """Elements and vectors of (N, m) states: the inverse of `joined`."""
+    elements, vectors = columns(loop)
+    if not vectors or elements[-1] < vectors[0]:
+        return states[:, : len(elements)], states[:, len(elements) :]
+    return states[:, elements], states[:, vectors]
 
 
 def joined(loop: Loop, X: Array, y: Array) -> Array:

@@ -26,6 +26,8 @@ def initial_own(loop: Loop, start: Array, given: Mapping[str, Any]) -> Array:
         raise InputError(
             f"closed_loop: no state {', '.join(unknown)} of the law; its own states: {', '.join(names) or 'none'}"
         )
+    if not names:
+        return start
     parts = [start]
     for each in loop.own_ports:
         value = given.get(each.name)

@@ -25,14 +25,14 @@ def gauss(system: System, X0: Array, y0: Array, times: Array, parts: int, where:
     Raises:
         ComputationError: a step is too long for the iteration or for the exponential, or a state is no longer finite.
     """
-    given, _kept = system.record()
+    given = system.record()
     X, y = np.array(X0, dtype=float), np.array(y0, dtype=float)
     k = len(times)
     X_out, y_out = np.empty((k, system.packed)), np.empty((k, system.size))
     X_out[0], y_out[0] = X, y
     work = system.work()
     h = float(times[-1] - times[0]) / ((k - 1) * parts)
-    given.h, given.reach, given.work = h, system.reach, work.ctypes.data
+    given.h, given.work = h, work.ctypes.data
     given.X, given.y = X.ctypes.data, y.ctypes.data
     library = compiled_pair()
     block = max(1, _BLOCK // parts)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from math import nan, sqrt
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.pair_lanes import run_lanes
-from lie_codegen.flow.pair_library import FULL, MANY, compiled_pair, refuse
+from lie_codegen.flow.pair_library import DONE, FULL, MANY, compiled_pair, refuse
 from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.threads import share_out
 
@@ -30,6 +31,11 @@ _PILOT, _MARGIN = 16, 16.0
 _RATIO = 16.0
 #: Times at which two runs of a single member of a steady system are compared: the longer steps need not end at all that were asked for.
 _COMPARED = 8
+#: An interpolated state may err so many times more than a step: once, where the errors of steps add up.
+_BETWEEN = 2.0
+#: Where steps go as they like the first run of a member has local errors of this part of the tolerance: of hundred loops on SO(3) and SE(3)
+#: at 1e-5 to 1e-12 nine needed a third run with 1, none with 1/4, for a tenth more steps.
+_FREE_SHARE = 0.25
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
@@ -64,7 +70,7 @@ class PairRun:
         at = np.ascontiguousarray(knots, dtype=np.intp)
         part = np.ascontiguousarray(parts, dtype=float)
         X, y = np.empty((len(at), system.packed)), np.empty((len(at), system.size))
-        given, _kept = system.record()
+        given = system.record()
         work = system.work()
         given.knot_t, given.knot_h = self.knot_t.ctypes.data, self.knot_h.ctypes.data
         given.knot_X, given.knot_y, given.work = self.knot_X.ctypes.data, self.knot_y.ctypes.data, work.ctypes.data
@@ -117,20 +123,35 @@ def _to_tolerance(
     """
     # The error of a run is in proportion to its local tolerance: of two whose tolerances differ by a factor r the
     # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
-    share, one = 1.0, len(X0) == 1
+    one = len(X0) == 1
+    free = one and system.algebra is not None and len(times) > 2  # steps go as they like, and all times cost little
+    share = _FREE_SHARE if free else 1.0
     # the last time and those a whole number of places before it, but for the first
-    apart = -(-(len(times) - 1) // _COMPARED) if one and system.steady else 1
+    apart = -(-(len(times) - 1) // _COMPARED) if one and system.steady and not free else 1
     compared = slice((len(times) - 1) % apart or apart, None, apart)
-    coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), rtol, atol + rtol, where)
-    X, y = coarse.X[1:], coarse.y[1:]
+    found = (
+        _twice(system, X0, y0, times, (*_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO)))
+        if free
+        else None
+    )
+    if found is None:
+        coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), *_local(rtol, atol, share), where)
+        X, y, steps = coarse.X[1:], coarse.y[1:], coarse.steps
     for _ in range(_MOST_RUNS):
         share /= _RATIO
-        local = max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST)
-        fine = _once(system, X0, y0, times, *local, where)
-        with np.errstate(invalid="ignore"):
-            difference = max(_size(fine.X[compared] - X), _size(fine.y[compared] - y))
-        scale = max(1.0, _size(fine.X), _size(fine.y))
-        estimate = 2 * difference / (_RATIO - 1)
+        local = _local(rtol, atol, share)
+        if found is None:
+            fine = _once(system, X0, y0, times, *local, where)
+            with np.errstate(invalid="ignore"):
+                difference = max(_size(fine.X[compared] - X), _size(fine.y[compared] - y))
+            size = max(_size(fine.X), _size(fine.y))
+        else:
+            fine, difference, size, steps = found
+            found = None
+        scale = max(1.0, size)
+        # errors go as the eighth power of the steps: where these hardly became shorter, the tolerances promise too much
+        ratio = min(_RATIO, max((fine.steps / steps) ** 8, 2.0)) if free else _RATIO
+        estimate = 2 * difference / (ratio - 1)
         # Rounding: no run of so many steps knows its states better.
         floor = 1e-15 * scale * sqrt(fine.steps / len(X0))
         goal = max(rtol * scale, atol, floor)
@@ -145,13 +166,17 @@ def _to_tolerance(
         needed = estimate / max(rtol * scale, atol)
         if needed > _RATIO**2:  # far off: the next pair starts there
             share /= min(needed / _RATIO, 1e4)
-            local = max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST)
-            fine = _once(system, X0, y0, times, *local, where)
-        X, y = fine.X[compared], fine.y[compared]
+            fine = _once(system, X0, y0, times, *_local(rtol, atol, share), where)
+        X, y, steps = fine.X[compared], fine.y[compared], fine.steps
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
     )
+
+
+def _local(rtol: float, atol: float, share: float) -> tuple[float, float]:
+    """Relative and absolute local errors of that share of the tolerance."""
+    return max(rtol * share, _SMALLEST), max((atol + rtol) * share, _SMALLEST)
 
 
 def _size(of: Array) -> float:
@@ -194,42 +219,105 @@ def _many(
 
 def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
     """One run of a single member, with its knots."""
-    packed, size, k = system.packed, system.size, len(times)
-    given, _kept = system.record()
+    packed, size, group, k = system.packed, system.size, system.group, len(times)
+    # a system that can be interpolated steps to its end, and the states between come afterwards
+    between = system.algebra is not None and k > 2
+    given = system.record()
     X_out, y_out = np.empty((k, 1, packed)), np.empty((k, 1, size))
     X_out[0], y_out[0] = X0, y0
-    # one block of memory: the state, which is read in whole eights, the times behind the first, what a step works with
+    # one block of memory: the state, which is read in whole eights, the times behind the first, what steps and interpolation work with
     state = packed + size
-    block = np.empty(state + k - 1 + system.work_size)
-    block[:packed], block[packed:state], block[state : state + k - 1] = X0[0], y0[0], times[1:]
+    work = state + k - 1
+    dense = work + system.work_size
+    block = np.empty(dense + system.between_size if between else dense)
+    block[:packed], block[packed:state], block[state:work] = X0[0], y0[0], times[1:]
     at = block.ctypes.data
     given.t, given.h, given.rtol, given.atol = float(times[0]), 0.0, rtol, atol
-    given.reach, given.longest = system.reach, float(times[-1] - times[0])
-    given.X, given.y, given.times, given.work = at, at + 8 * packed, at + 8 * state, at + 8 * (state + k - 1)
-    given.count = k - 1
-    given.X_out, given.y_out = X_out.ctypes.data + 8 * packed, y_out.ctypes.data + 8 * size
+    given.longest = float(times[-1] - times[0])
+    given.X, given.y, given.work, given.dense = at, at + 8 * packed, at + 8 * work, at + 8 * dense
+    wanted = at + 8 * state, k - 1, X_out.ctypes.data + 8 * packed, y_out.ctypes.data + 8 * size
+    ahead = k - 2 if between else 0  # outputs that the run does not know of
+    given.times, given.count = wanted[0] + 8 * ahead, wanted[1] - ahead
+    given.X_out, given.y_out = wanted[2] + 8 * packed * ahead, wanted[3] + 8 * size * ahead
     knots: list[tuple[Array, ...]] = []
     library, status, room = compiled_pair(), FULL, min(_FIRST_STEPS, _STEPS)
+    widths = (1, 1, packed, size, size, group) if between else (1, 1, packed, size)
     while status == FULL:
-        rows = np.empty(room * (2 + packed + size))
+        rows = np.empty((room + 1) * sum(widths))  # a row more: the end
         first, given.room = rows.ctypes.data, room
-        given.knot_t, given.knot_h = first, first + 8 * room
-        given.knot_X, given.knot_y = first + 16 * room, first + 8 * room * (2 + packed)
+        places = [first + 8 * (room + 1) * before for before in accumulate(widths[:-1], initial=0)]
+        given.knot_t, given.knot_h, given.knot_X, given.knot_y = places[:4]
+        if between:
+            given.knot_slope, given.knot_theta = places[4:]
         status = library.pair_run(ctypes.addressof(given), room)
-        knots.append(_rows(rows, room, given.knots, packed, size))
+        knots.append(_rows(rows, room + 1, given.knots + (between and status == DONE), widths))
         if given.steps + given.rejected > _MOST_STEPS:
             status = MANY
         room = _STEPS
     refuse(status, given.t, atol, _MOST_STEPS, where)
     kept = knots[0] if len(knots) == 1 else tuple(np.concatenate(each) for each in zip(*knots, strict=True))
+    if between:
+        given.times, given.count, given.X_out, given.y_out = wanted
+        given.knot_t, given.knot_h, given.knot_X, given.knot_y, given.knot_slope, given.knot_theta = (
+            each.ctypes.data for each in kept
+        )
+        library.pair_between(ctypes.addressof(given), given.steps, _BETWEEN)
+        kept = tuple(each[:-1] for each in kept[:4])
     return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, nan, *kept)
 
 
-def _rows(rows: Array, room: int, count: int, packed: int, size: int) -> tuple[Array, Array, Array, Array]:
-    """Copies of t, h, X and y of so many knots of a block with room for more."""
-    t, h, rest = rows[:count], rows[room : room + count], rows[2 * room :]
-    X, y = rest[: count * packed], rest[room * packed : room * packed + count * size]
-    return t.copy(), h.copy(), X.reshape(count, packed).copy(), y.reshape(count, size).copy()
+def _twice(
+    system: System, X0: Array, y0: Array, times: Array, tolerances: tuple[float, float, float, float]
+) -> tuple[PairRun, float, float, int] | None:
+    """One member at two tolerances (relative and absolute local errors of one, of the other), in one call of compiled code.
+
+    Returns:
+        The second run, its largest difference to the first, its size, the steps of the first; None where one of them needs more
+        than the first room for knots, or fails: `_once` says how.
+    """
+    packed, size, group, k = system.packed, system.size, system.group, len(times)
+    state, rows = packed + size, _FIRST_STEPS + 1
+    given = system.record()
+    # behind each other: the start, found, tolerances; state and times; the states of the first run; what steps and interpolation work
+    # with; knots by columns
+    sizes = (
+        state, 4, 4, packed, size, k - 1, (k - 1) * state, system.work_size, system.between_size,
+        rows, rows, rows * packed, rows * size, rows * size, rows * group,
+    )  # fmt: skip
+    places = [0, *accumulate(sizes)]
+    block, X, y = np.empty(places[-1]), np.empty((k, 1, packed)), np.empty((k, 1, size))
+    block[:packed], block[packed:state], block[places[2] : places[3]] = X0[0], y0[0], tolerances
+    block[places[5] : places[6]] = times[1:]
+    X[0], y[0] = X0, y0
+    at = block.ctypes.data
+    start, found, asked, given.X, given.y, given.times, first, given.work, given.dense, *knots = [
+        at + 8 * place for place in places[:-1]
+    ]
+    given.knot_t, given.knot_h, given.knot_X, given.knot_y, given.knot_slope, given.knot_theta = knots
+    given.t, given.longest, given.count = times[0], times[-1] - times[0], k - 1
+    given.room = _FIRST_STEPS
+    given.X_out, given.y_out = X.ctypes.data + 8 * packed, y.ctypes.data + 8 * size
+    if compiled_pair().pair_twice(ctypes.addressof(given), start, asked, _FIRST_STEPS, _BETWEEN, first, found) != DONE:
+        return None
+    count = given.steps
+    t, h, Xs, ys = (
+        block[places[9 + j] : places[9 + j] + count * width].copy() for j, width in enumerate((1, 1, packed, size))
+    )
+    off_X, off_y, largest, coarse = block[places[1] : places[2]].tolist()
+    run = PairRun(
+        X, y, count, given.rejected, given.evaluations, nan, t, h, Xs.reshape(count, packed), ys.reshape(count, size)
+    )
+    return run, max(off_X, off_y), largest, int(coarse)
+
+
+def _rows(rows: Array, room: int, count: int, widths: tuple[int, ...]) -> tuple[Array, ...]:
+    """Copies of t, h, X, y and what else of so many knots of a block with room for more."""
+    found, place = [], 0
+    for k, width in enumerate(widths):
+        part = rows[place : place + count * width].copy()
+        found.append(part.reshape(count, width) if k > 1 else part)
+        place += room * width
+    return tuple(found)
 
 
 def _no_knots(system: System) -> tuple[Array, Array, Array, Array]:

@@ -46,9 +46,10 @@ class Pair(ctypes.Structure):
         *((n, ctypes.c_double) for n in ("t", "t_low", "h", "rtol", "atol", "reach", "longest")),
         *((n, ctypes.c_void_p) for n in ("X", "y", "times")),
         *((n, ctypes.c_ssize_t) for n in ("count", "next")),
-        *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y")),
+        *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y", "knot_slope", "knot_theta")),
         *((n, ctypes.c_ssize_t) for n in ("room", "knots")), ("work", ctypes.c_void_p),
-        *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations")),
+        *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations", "algebra", "brackets")),
+        *((n, ctypes.c_void_p) for n in ("bracket_index", "bracket_c", "dense")), ("between", ctypes.c_double),
     ]  # fmt: skip
 
 
@@ -58,7 +59,11 @@ def pair_library() -> Any:
 
     def files() -> dict[str, str]:
         text = (template_folder() / "pair853.c").read_text(encoding="utf-8")
-        return {"pair853.c": text, **pair_headers()}
+        return {
+            "pair853.c": text,
+            **pair_headers(),
+            "pair_hermite.h": (template_folder() / "pair_hermite.h").read_text(encoding="utf-8"),
+        }
 
     try:
         path = build_source(files, "pair853.c", namespace="pair853", definition="pair853", more_flags=("-O3",))
@@ -69,6 +74,12 @@ def pair_library() -> Any:
     library, size, pointer = load_library(path), ctypes.c_ssize_t, ctypes.c_void_p
     library.pair_run.restype, library.pair_run.argtypes = size, (pointer, size)
     library.gauss_run.restype, library.gauss_run.argtypes = size, (pointer, size, size)
+    library.pair_twice.restype, library.pair_twice.argtypes = (
+        size,
+        (pointer, pointer, pointer, size, ctypes.c_double, pointer, pointer),
+    )
+    library.between_size.restype, library.between_size.argtypes = size, (size, size)
+    library.pair_between.restype, library.pair_between.argtypes = None, (pointer, size, ctypes.c_double)
     library.pair_within.restype, library.pair_within.argtypes = (
         None,
         (pointer, size, pointer, pointer, pointer, pointer),

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
-from lie_codegen.flow.pair_library import STAGES, Pair, pair_library
+from lie_codegen.flow.pair_library import STAGES, Pair, compiled_pair, pair_library
 from lie_codegen.runtime.call import Compiled
 
 
@@ -27,6 +28,8 @@ class System:
         numbers: the other inputs of the rate in its order, of all members (*shape) or one each (N, *shape).
         steady: whether the rate is known not to read t. Another may change within a moment that only steps which end at all times
             that were asked for get past.
+        algebra: of the group, where y begins (Theta, xi, ...) with X' = X hat(xi) and the rate is steady: then states between
+            steps are interpolated. None elsewhere.
     """
 
     rate: Compiled[Any]
@@ -35,6 +38,7 @@ class System:
     reach: float
     numbers: tuple[Array, ...] = ()
     steady: bool = False
+    algebra: LieAlgebra | None = None
 
     @cached_property
     def packed(self) -> int:
@@ -62,6 +66,19 @@ class System:
         wide = -(-self.size // 8) * 8
         return wide * (STAGES + 4) + 2 * self.packed
 
+    @cached_property
+    def brackets(self) -> tuple[Array, Array]:
+        """(m, 3) and (m,): [A_i, A_j] = sum_k c A_k of i < j, as indices i, j, k and c."""
+        c = np.zeros((1, 1, 1)) if self.algebra is None else self.algebra.structure_constants
+        index = np.argwhere(c)
+        index = index[index[:, 0] < index[:, 1]]
+        return np.ascontiguousarray(index, dtype=np.intp), np.ascontiguousarray(c[tuple(index.T)])
+
+    @cached_property
+    def between_size(self) -> int:
+        """Doubles that interpolation works with."""
+        return int(compiled_pair().between_size(self.group, self.size))
+
     def work(self) -> Array:
         """Room for a step."""
         return np.empty(self.work_size)
@@ -81,15 +98,24 @@ class System:
         numbers = [np.ascontiguousarray(v, dtype=float) for v in self.numbers]
         return numbers, [v[0].size if self._is_own(k) else 0 for k, v in enumerate(numbers)]
 
-    def record(self) -> tuple[Pair, Sequence[Any]]:
-        """The system of a single member as the C reads it, and what has to stay."""
+    def record(self) -> Pair:
+        """The system of a single member as the C reads it: what it points to stays as long as the system does."""
+        return Pair.from_buffer_copy(self._record[0])
+
+    @cached_property
+    def _record(self) -> tuple[Pair, Sequence[Any]]:
+        """The same, and what has to stay."""
         numbers, _strides = self.members_numbers()
         pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(v.ctypes.data for v in numbers))
         given = Pair()
         given.rate, given.move = self._one
-        given.packed, given.group, given.size = self.packed, self.group, self.size
+        given.packed, given.group, given.size, given.reach = self.packed, self.group, self.size, self.reach
         given.numbers, given.number = len(numbers), ctypes.addressof(pointers)
-        return given, (numbers, pointers)
+        index, c = self.brackets
+        given.algebra, given.brackets, given.bracket_index, given.bracket_c = (
+            self.group, len(c), index.ctypes.data, c.ctypes.data
+        )  # fmt: skip
+        return given, (numbers, pointers, index, c)
 
     def _is_own(self, k: int) -> bool:
         return bool(self.numbers[k].ndim > len(self.rate.inputs[3 + k].shape))

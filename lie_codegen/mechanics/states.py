@@ -35,7 +35,10 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
         raise ShapeError(f"initial states on {group.name}: {len(X)} X0 and {len(xi)} xi0; give one of each, or as many")
     count = max(counts, default=1)
     X = admitted(group, X, "X0").X if X.ndim == 2 else admitted_all(group, X, "X0")[0]
-    X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
+    if many:
+        X, xi = np.broadcast_to(X, (count, d, d)), np.broadcast_to(xi, (count, n))
+    else:
+        X, xi = X[None], xi[None]
     rows, columns = _places(group)
     entries = np.ascontiguousarray(X[:, rows, columns])
     flat = entries.view(float) if group.is_complex else entries
