@@ -428,7 +428,8 @@ static double largest(ptrdiff_t n, const double *a, const double *b)
 }
 
 /*
- * A run of one member at each of two tolerances (relative, absolute; of the first run, of the second): the states of the first in
+ * A run of one member at each of two tolerances (relative, absolute; of the first run, of the second; then by how
+ * much the second keeps Theta shorter, so that it differs where the reach is what limits steps): the states of the first in
  * `other`, first those of X, and how far they are from those of the second: of X, of y, the size of the second, and the steps of the first.
  */
 EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, double *other, double *found);
@@ -448,6 +449,7 @@ EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *toleranc
     }
     found[3] = (double)p->steps;
     p->evaluations = 0;
+    p->reach *= tolerances[4];
     status = whole(p, start, tolerances + 2, most_steps, most);
     if (status == DONE) {
         found[0] = largest(elements, other, X);

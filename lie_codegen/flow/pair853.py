@@ -29,6 +29,8 @@ _BLOCK = 64
 _PILOT, _MARGIN = 16, 16.0
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 16.0
+#: By so much its steps are shorter.
+_SHORTER = _RATIO ** (-1 / 8)
 #: Times at which two runs of a single member of a steady system are compared: the longer steps need not end at all that were asked for.
 _COMPARED = 8
 #: An interpolated state may err so many times more than a step: once, where the errors of steps add up.
@@ -130,7 +132,7 @@ def _to_tolerance(
     apart = -(-(len(times) - 1) // _COMPARED) if one and system.steady and not free else 1
     compared = slice((len(times) - 1) % apart or apart, None, apart)
     found = (
-        _twice(system, X0, y0, times, (*_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO)))
+        _twice(system, X0, y0, times, (*_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO), _SHORTER))
         if free
         else None
     )
@@ -140,6 +142,8 @@ def _to_tolerance(
     for _ in range(_MOST_RUNS):
         share /= _RATIO
         local = _local(rtol, atol, share)
+        if free:  # where the reach limits steps two runs would be the same
+            system = replace(system, reach=system.reach * _SHORTER)
         if found is None:
             fine = _once(system, X0, y0, times, *local, where)
             with np.errstate(invalid="ignore"):
@@ -267,9 +271,9 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
 
 
 def _twice(
-    system: System, X0: Array, y0: Array, times: Array, tolerances: tuple[float, float, float, float]
+    system: System, X0: Array, y0: Array, times: Array, tolerances: tuple[float, float, float, float, float]
 ) -> tuple[PairRun, float, float, int] | None:
-    """One member at two tolerances (relative and absolute local errors of one, of the other), in one call of compiled code.
+    """One member at two tolerances (relative and absolute local errors of one, of the other; the factor of the reach of the other), in one call.
 
     Returns:
         The second run, its largest difference to the first, its size, the steps of the first; None where one of them needs more
@@ -281,7 +285,7 @@ def _twice(
     # behind each other: the start, found, tolerances; state and times; the states of the first run; what steps and interpolation work
     # with; knots by columns
     sizes = (
-        state, 4, 4, packed, size, k - 1, (k - 1) * state, system.work_size, system.between_size,
+        state, 4, 5, packed, size, k - 1, (k - 1) * state, system.work_size, system.between_size,
         rows, rows, rows * packed, rows * size, rows * size, rows * group,
     )  # fmt: skip
     places = [0, *accumulate(sizes)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -14,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from lie_codegen.benchmarks import loop_peers, turns
-from lie_codegen.benchmarks.loop_cases import loop_case, loop_error
+from lie_codegen.benchmarks.loop_cases import START, loop_case, loop_error, rate_of, states_of
 from lie_codegen.benchmarks.propagate import PropagateRow, bench_propagate, missed, table, with_ratios
 from lie_codegen.benchmarks.propagate_cases import chain_case
 from lie_codegen.benchmarks.propagate_ours import precision_rows
@@ -53,6 +54,23 @@ def test_the_attitude_loop_of_the_peers_is_ours_and_the_formula() -> None:
     call, read = loop_peers.scipy(one, 1e-11)
     assert loop_error(read(call())[20, 0]) < 1e-8
     assert one.error(found, found[:2]) == np.inf
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+def test_our_attitude_loop_is_the_stored_one_to_its_tolerance(rtol: float) -> None:
+    """At the stored times, and at all 101 of them as DOP853 of scipy has it."""
+    case = loop_case()
+    call, read = loop_peers.ours(case, rtol)
+    found, estimate = read(call()), call().error_estimate
+    assert case.error(found, np.zeros_like(found)) <= rtol
+    rate = rate_of(math.sqrt, math.atan2)
+    start = np.append(START, case.xi0[0])  # short steps, so that scipy's interpolant is as good as they are
+    run = solve_ivp(
+        lambda t, y: rate(*y, 1, 2, 3, 4, 6), (0, 10), start, "DOP853", case.t, rtol=3e-14, atol=1e-15, max_step=0.02
+    )
+    off = np.max(np.abs(found[:, 0] - states_of(run.y[:4].T, run.y[4:].T)))
+    assert off <= rtol
+    assert off <= max(estimate, 1e-13)
 
 
 def test_a_case_runs_with_the_tools_at_hand(monkeypatch: pytest.MonkeyPatch) -> None:

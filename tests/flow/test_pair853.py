@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -78,6 +79,11 @@ def with_numbers(system: System, J: np.ndarray, k: Any = 0.0) -> System:
     return System(
         system.rate, system.move, system.group, system.reach, (J, np.linalg.inv(J), np.asarray(k, dtype=float))
     )
+
+
+def interpolated(system: System, name: str) -> System:
+    """The same, known not to read the time: steps go as they like, and states between are interpolated."""
+    return replace(system, steady=True, algebra=lc.group(name).algebra)
 
 
 def start(name: str, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -254,3 +260,54 @@ def test_one_member_that_escapes_stops_them_all() -> None:
         pair853._many(
             with_numbers(free_body("so3", damping=True), J, k), *start("so3", np.ones((20, 3))), np.array([0.0, 5.0]), 1e-9, 1e-9, "test"
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["so3", "se3", "sl2", "se2"])
+def test_interpolated_states_are_as_good_as_the_tolerance_at_every_time(name: str) -> None:
+    """Errors at 201 times of a run of far fewer steps fall as the tolerance does, and the estimate covers them."""
+    n = lc.group(name).dim
+    J, xi, times = np.diag(np.arange(1.0, n + 1)) + 0.1, np.linspace(0.3, 1.1, n), np.linspace(0, 3, 201)
+    system = interpolated(with_numbers(free_body(name), J), name)
+    X, w = reference(name, J, xi, times, None)
+    scale = max(1.0, np.max(np.abs(X)), np.max(np.abs(w)))
+    tolerances, errors = np.array([1e-4, 1e-6, 1e-8, 1e-10]), []
+    for rtol in tolerances:
+        run = integrate(system, *start(name, xi), times, rtol=rtol, atol=0.0, where="test")
+        off = max(np.max(np.abs(matrices(name, run.X[:, 0]) - X)), np.max(np.abs(run.y[:, 0, n:] - w)))
+        assert off <= run.error_estimate + 1e-12 * scale
+        assert run.error_estimate <= rtol * scale
+        assert run.steps < 100
+        assert np.all(run.y[:, 0, :n] == 0)
+        errors.append(off)
+    slope = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
+    assert 0.7 < slope < 1.3
+
+
+def test_states_between_few_steps_are_found_by_steps_of_their_own() -> None:
+    J, xi, times = np.diag([1.0, 2.0, 3.0]), np.array([0.3, 1.0, 0.2]), np.linspace(0, 0.02, 31)
+    run = integrate(
+        interpolated(with_numbers(free_body("so3"), J), "so3"),
+        *start("so3", xi),
+        times,
+        rtol=1e-10,
+        atol=0.0,
+        where="test",
+    )
+    X, w = reference("so3", J, xi, times, None)
+    assert run.steps < 5
+    assert np.max(np.abs(matrices("so3", run.X[:, 0]) - X)) < 1e-12
+    assert np.max(np.abs(run.y[:, 0, 3:] - w)) < 1e-12
+
+
+def test_interpolated_states_of_a_run_in_blocks_are_those_of_one_in_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = np.linspace(0, 20, 301)
+    system = interpolated(with_numbers(free_body("so3", damping=True), np.diag([1.0, 2.0, 3.0]), 1.0), "so3")
+    whole = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
+    monkeypatch.setattr(pair853, "_FIRST_STEPS", 3)
+    monkeypatch.setattr(pair853, "_STEPS", 5)
+    parts = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
+    assert whole.steps == parts.steps
+    np.testing.assert_allclose(parts.y, whole.y, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(parts.X, whole.X, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(parts.knot_t, whole.knot_t, rtol=0, atol=1e-12)
+    assert parts.error_estimate == pytest.approx(whole.error_estimate, rel=1e-3)
