@@ -41,7 +41,7 @@ typedef struct {
     V size;
 } point;
 
-/* One group of lanes at work. */
+/* One vector of lanes at work. */
 typedef struct {
     const programme *p;
     int columns;        /* C = slots M */

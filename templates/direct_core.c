@@ -1,5 +1,5 @@
 /*
- * Steering by reaching first and descending afterwards: many starts side by side, one in each lane of a vector of doubles.
+ * Steering by reaching first and descending afterwards: many starts side by side, one in each lane of a vector of doubles, GROUP in turn.
  *
  *     Y = L X0 E_1 ... E_K R,   E_k = exp(a_k + sum_i (p_k u[s_k, i] + q_k u[s_k + 1, i]) b_ki)
  *
@@ -47,7 +47,7 @@ static void restrict_bracket(task *w, double *value, void *indices)
     w->acting.value = value;
 }
 
-/* Takes the memory that is lent, and the lanes from `first` on; lanes beyond the last repeat it. */
+/* Takes the memory that is lent, and the vector of lanes from `first` on; lanes beyond the last repeat it. */
 static void begin(task *w, const programme *p, int lanes, int first, double *memory)
 {
     V *next = (V *)memory;
@@ -88,14 +88,6 @@ static void begin(task *w, const programme *p, int lanes, int first, double *mem
     }
 }
 
-/* Doubles of memory for a programme, to be aligned to 64 bytes. */
-size_t direct_memory(const programme *p)
-{
-    const size_t columns = (size_t)p->slots * M, K = (size_t)p->exponentials;
-    return LANES * ((11 + 3 * N) * columns + K * (ENTRIES + (2 + M) * N + M * M) + N * (N + ENTRIES))
-        + (size_t)(LANES + 2) * (size_t)p->bracket.first[N];
-}
-
 static void read_lanes(const task *w, const double *u, V *to)
 {
     int l, c;
@@ -105,6 +97,33 @@ static void read_lanes(const task *w, const double *u, V *to)
             LANE(to[c], l) = fmin(fmax(value, w->p->low[c]), w->p->high[c]);
         }
     }
+}
+
+/* Doubles of memory for one vector of lanes: vectors in whole, too, what is behind them. */
+static size_t memory_of_pack(const programme *p)
+{
+    const size_t columns = (size_t)p->slots * M, K = (size_t)p->exponentials, brackets = (size_t)p->bracket.first[N];
+    return LANES
+        * ((11 + 3 * N) * columns + K * (ENTRIES + (2 + M) * N + M * M) + N * (N + ENTRIES) + brackets
+            + (2 * brackets + LANES - 1) / LANES);
+}
+
+/* Doubles of memory for a programme, to be aligned to 64 bytes. */
+size_t direct_memory(const programme *p)
+{
+    return PACKS * memory_of_pack(p);
+}
+
+/* Takes the memory for the group of starts from `first` on, with the controls u in the `at` of each; returns how many there are. */
+static int begin_group(task *w, const programme *p, int lanes, int first, const double *u, double *memory)
+{
+    const int count = lanes - first < GROUP ? lanes - first : GROUP;
+    int k;
+    for (k = 0; k < packs_of(count); ++k) {
+        begin(w + k, p, lanes, first + k * LANES, memory + (size_t)k * memory_of_pack(p));
+        read_lanes(w + k, u, w[k].at.u);
+    }
+    return count;
 }
 
 static void write_lanes(const task *w, int lanes, int first, const point *at, double *u, double *size)
@@ -118,32 +137,29 @@ static void write_lanes(const task *w, int lanes, int first, const point *at, do
     }
 }
 
-static Mask everywhere(void)
-{
-    return LESS(spread(0.0), spread(1.0));
-}
-
 /*
  * Stage 1: from the controls u (lanes, slots, M) to controls that reach the goal; the residual each lane is left with, and by what phase its
  * end is ahead of the value, where that is free.
  */
 void direct_reach(const programme *p, int lanes, double *u, double *size, double *phase, int *used, double *memory)
 {
-    int first, l;
-    for (first = 0; first < lanes; first += LANES) {
-        task w;
-        int steps[LANES] = {0};
-        begin(&w, p, lanes, first, memory);
-        read_lanes(&w, u, w.at.u);
-        arrive(&w, &w.at, everywhere(), p->reach_iterations, p->enough, p->damping, p->wanted, steps);
-        write_lanes(&w, lanes, first, &w.at, u, size);
-        if (p->free_phase) {
-            examine(&w, &w.at);
+    int first, k, l;
+    for (first = 0; first < lanes; first += GROUP) {
+        task w[PACKS];
+        int steps[GROUP] = {0};
+        const int count = begin_group(w, p, lanes, first, u, memory);
+        arrive(w, count, steps);
+        for (k = 0; k < packs_of(count); ++k) {
+            write_lanes(w + k, lanes, first + k * LANES, &w[k].at, u, size);
+            if (p->free_phase) {
+                examine(w + k, &w[k].at);
+            }
         }
-        for (l = 0; l < LANES && first + l < lanes; ++l) {
+        for (l = 0; l < count; ++l) {
             used[first + l] = steps[l];
             if (p->free_phase) {
-                phase[first + l] = atan2(LANE(w.ahead[1], l), LANE(w.ahead[0], l));
+                const V *ahead = w[l / LANES].ahead;
+                phase[first + l] = atan2(LANE(ahead[1], l % LANES), LANE(ahead[0], l % LANES));
             }
         }
     }
@@ -174,6 +190,56 @@ void direct_linearise(const programme *p, int lanes, const double *u, double *si
     }
 }
 
+/* Where one vector of lanes stands in its descent. */
+typedef struct {
+    V rho, sigma; /* what keeps proximal steps and Newton's short */
+    V best;       /* the objective at `kept` */
+    V dual[N];    /* multipliers of the reduced residual */
+    V next[N];    /* the same after the step in hand */
+    V expected;   /* what that step is to gain */
+    V quiet;      /* small gains in a row */
+    Mask open;
+} descent;
+
+/* The step of round `curved` from what is kept, within the bounds, to `at`. */
+static void propose(task *w, descent *d, int curved)
+{
+    const programme *p = w->p;
+    int c;
+    memcpy(d->next, d->dual, sizeof d->next);
+    linearise(w, &w->kept);
+    if (curved) {
+        d->expected = newton(w, &w->kept, d->rho, d->sigma, d->next, w->v);
+    } else {
+        proximal(w, &w->kept, d->rho, d->next, w->v);
+    }
+    for (c = 0; c < w->columns; ++c) {
+        w->at.u[c] = least(largest(w->v[c], spread(p->low[c])), spread(p->high[c]));
+    }
+}
+
+/* Keeps what is at the goal and cheaper; where the gain was not small the lane goes on. */
+static void judge(task *w, descent *d, int curved)
+{
+    const programme *p = w->p;
+    const V found = objective(w, w->at.u);
+    const Mask better = d->open & LESS(w->at.size, spread(100.0 * p->enough)) & LESS(found, d->best);
+    const V gain = SELECT(better, d->best - found, spread(0.0));
+    const Mask small = better & NOT(LESS(p->relative * d->best, gain));
+    int i;
+    take(w, better, &w->kept, &w->at);
+    for (i = 0; i < N; ++i) {
+        d->dual[i] = SELECT(better, d->next[i], d->dual[i]);
+    }
+    d->best = SELECT(better, found, d->best);
+    if (curved) {
+        d->sigma = SELECT(better, 0.1 * d->sigma, largest(8.0 * d->sigma, spread(0.01)));
+    } else {
+        d->rho = SELECT(better, largest(d->rho * (1.0 / 3.0), spread(1e-6)), 4.0 * d->rho);
+        d->quiet = SELECT(small, d->quiet + 1.0, SELECT(better, spread(0.0), d->quiet));
+    }
+}
+
 /*
  * Stage 2: from controls that reach the goal to cheaper ones that reach it too. Each round takes the proximal step of the
  * linearised problem and restores the goal by a few undamped steps; rho, which keeps the step short, falls with success.
@@ -181,73 +247,76 @@ void direct_linearise(const programme *p, int lanes, const double *u, double *si
  */
 void direct_descend(const programme *p, int lanes, double *u, double *size, double *cost, double *y, int *used, double *memory)
 {
-    const double enough = 100.0 * p->enough;
     double leader = INFINITY; /* the least of what lanes have ended at */
-    int first, l, i, c, round;
-    for (first = 0; first < lanes; first += LANES) {
-        task w;
-        V rho = spread(1.0), sigma = spread(0.01), best, dual[N], quiet = spread(0.0), next[N];
-        Mask open = everywhere();
-        begin(&w, p, lanes, first, memory);
-        read_lanes(&w, u, w.kept.u);
-        best = objective(&w, w.kept.u);
-        for (i = 0; i < N; ++i) {
-            dual[i] = spread(0.0);
+    int first, k, l, i, round, busy;
+    for (first = 0; first < lanes; first += GROUP) {
+        task w[PACKS];
+        descent state[PACKS];
+        const int count = begin_group(w, p, lanes, first, u, memory), packs = packs_of(count);
+        memset(state, 0, sizeof state);
+        for (k = 0; k < packs; ++k) {
+            descent *const d = state + k;
+            memcpy(w[k].kept.u, w[k].at.u, (size_t)w->columns * sizeof *w->at.u);
+            d->rho = spread(1.0);
+            d->sigma = spread(0.01);
+            d->best = objective(w + k, w[k].kept.u);
+            d->open = LESS(d->quiet, d->rho);
         }
-        for (l = 0; l < LANES && first + l < lanes; ++l) {
+        for (l = 0; l < count; ++l) {
             used[first + l] = 0;
         }
-        for (round = 0; round < p->descend_iterations && any(open); ++round) {
+        for (round = 0, busy = 1; round < p->descend_iterations && busy; ++round) {
             const int curved = !p->fuel && round >= NEWTON && round % 2;
-            V found, gain, expected = spread(INFINITY);
-            Mask better, small;
-            memcpy(next, dual, sizeof next);
-            linearise(&w, &w.kept);
-            if (curved) {
-                expected = newton(&w, &w.kept, rho, sigma, next, w.v);
-            } else {
-                proximal(&w, &w.kept, rho, next, w.v);
+            Mask active[PACKS];
+            int idle[PACKS] = {0};
+            for (k = 0; k < PACKS; ++k) {
+                active[k] = state[k].open;
             }
-            for (c = 0; c < w.columns; ++c) {
-                w.at.u[c] = least(largest(w.v[c], spread(p->low[c])), spread(p->high[c]));
+            for (k = 0; k < packs; ++k) {
+                const descent *d = state + k;
+                /* lanes that have closed go on where what they end at may become the least of all */
+                idle[k] = !any(p->fuel ? d->open : d->open | LESS(d->best, spread(leader)));
+                if (!idle[k]) {
+                    propose(w + k, state + k, curved);
+                }
             }
-            restore(&w, &w.at, w.kept.J, open);
-            found = objective(&w, w.at.u);
-            better = open & LESS(w.at.size, spread(enough)) & LESS(found, best);
-            gain = SELECT(better, best - found, spread(0.0));
-            small = better & NOT(LESS(p->relative * best, gain));
-            take(&w, better, &w.kept, &w.at);
-            for (i = 0; i < N; ++i) {
-                dual[i] = SELECT(better, next[i], dual[i]);
-            }
-            best = SELECT(better, found, best);
-            if (curved) {
-                sigma = SELECT(better, 0.1 * sigma, largest(8.0 * sigma, spread(0.01)));
+            restore(w, packs, active);
+            for (k = 0; k < packs; ++k) {
+                if (!idle[k]) {
+                    judge(w + k, state + k, curved);
+                }
                 /* a step that has next to nothing to gain is the end, and not even enough to catch up with the cheapest is, too */
-                for (l = 0; l < LANES; ++l) {
-                    if (!(LANE(expected, l) > p->relative * LANE(best, l))) {
-                        leader = fmin(leader, LANE(best, l));
+                for (l = 0; curved && !idle[k] && l < LANES; ++l) {
+                    const double best = LANE(state[k].best, l);
+                    if (!(LANE(state[k].expected, l) > p->relative * best)) {
+                        leader = fmin(leader, best);
                     }
                 }
-                open &= LESS(p->relative * best, expected) & LESS(best - HOPE * expected, spread(leader));
-                for (l = 0; l < LANES && first + l < lanes; ++l) {
-                    used[first + l] += LANE(open, l) != 0;
+            }
+            for (k = 0, busy = 0; k < packs; ++k) {
+                descent *const d = state + k;
+                if (!any(d->open)) {
+                    continue;
                 }
-                continue;
+                if (curved) {
+                    d->open &= LESS(p->relative * d->best, d->expected) & LESS(d->best - HOPE * d->expected, spread(leader));
+                }
+                for (l = 0; l < LANES && k * LANES + l < count; ++l) {
+                    used[first + k * LANES + l] += LANE(d->open, l) != 0;
+                }
+                if (!curved) { /* done after two small gains in a row, or where no step however short is a gain */
+                    d->open &= LESS(d->quiet, spread(1.5)) & LESS(d->rho, spread(1e6));
+                }
+                busy |= any(d->open);
             }
-            rho = SELECT(better, largest(rho * (1.0 / 3.0), spread(1e-6)), 4.0 * rho);
-            /* done after two small gains in a row, or where no step however short is a gain */
-            quiet = SELECT(small, quiet + 1.0, SELECT(better, spread(0.0), quiet));
-            for (l = 0; l < LANES && first + l < lanes; ++l) {
-                used[first + l] += LANE(open, l) != 0;
-            }
-            open &= LESS(quiet, spread(1.5)) & LESS(rho, spread(1e6));
         }
-        write_lanes(&w, lanes, first, &w.kept, u, size);
-        for (l = 0; l < LANES && first + l < lanes; ++l) {
-            cost[first + l] = LANE(best, l);
+        for (k = 0; k < packs; ++k) {
+            write_lanes(w + k, lanes, first + k * LANES, &w[k].kept, u, size);
+        }
+        for (l = 0; l < count; ++l) {
+            cost[first + l] = LANE(state[l / LANES].best, l % LANES);
             for (i = 0; i < N; ++i) {
-                y[(size_t)(first + l) * N + i] = LANE(dual[i], l);
+                y[(size_t)(first + l) * N + i] = LANE(state[l / LANES].dual[i], l % LANES);
             }
         }
     }

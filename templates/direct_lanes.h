@@ -9,28 +9,39 @@
 
 #include "direct_sizes.h"
 
-/* LANES starts run side by side in one vector of doubles; other compilers run one start at a time. */
-#if defined(__GNUC__) && !defined(LIE_CODEGEN_ONE_LANE)
+/* LANES starts lie in one vector of doubles, as many as the processor's registers hold: wider ones cost several times as much. */
+#if defined(LIE_CODEGEN_ONE_LANE) || !defined(__GNUC__)
+#define LANES 1
+#elif defined(LIE_CODEGEN_LANES)
+#define LANES LIE_CODEGEN_LANES
+#elif defined(__AVX512F__)
 #define LANES 8
+#elif defined(__AVX__)
+#define LANES 4
+#else
+#define LANES 2
+#endif
+#if LANES > 1
 #define LANE(v, l) ((v)[l])
 #define LESS(a, b) ((Mask)((a) < (b)))
 #define SELECT(mask, a, b) ((V)(((mask) & (Mask)(a)) | (~(mask) & (Mask)(b))))
 #define NOT(mask) (~(mask))
-#define TRUE_LANE (-1)
-typedef double V __attribute__((vector_size(64)));
-typedef int64_t Mask __attribute__((vector_size(64)));
+typedef double V __attribute__((vector_size(8 * LANES)));
+typedef int64_t Mask __attribute__((vector_size(8 * LANES)));
 #else
-#define LANES 1
 #define LANE(v, l) (*(&(v) + (l)))
 #define LESS(a, b) ((a) < (b))
 #define SELECT(mask, a, b) ((mask) ? (a) : (b))
 #define NOT(mask) (!(mask))
-#define TRUE_LANE 1
 typedef double V;
 typedef int Mask;
 #endif
 
-enum { ENTRIES = D * D * PARTS }; /* doubles of a matrix, complex ones as pairs */
+enum {
+    GROUP = 8,              /* starts that go on together, and decide together when to stop: no answer depends on LANES */
+    PACKS = GROUP / LANES,  /* vectors of a group */
+    ENTRIES = D * D * PARTS /* doubles of a matrix, complex ones as pairs */
+};
 
 static V spread(double value)
 {

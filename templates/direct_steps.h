@@ -6,7 +6,7 @@
 
 enum {
     FACES = 4,     /* times that a step is taken again without the controls it would push out of the bounds */
-    PATIENCE = 4,  /* steps that all may take, in units of those after which half of the lanes are there */
+    PATIENCE = 4,  /* steps that all may take, in units of those after which half of the group is there */
     RESTORE = 30   /* most steps back to the goal; fewer than ten where that can be done at all */
 };
 /* Residual up to which controls are so near to those before that the derivative there serves. */
@@ -143,83 +143,125 @@ static void take_slopes(const task *w, Mask where, point *to, const point *from)
     }
 }
 
-/*
- * Levenberg and Marquardt's steps from at->u, projected on the bounds, in lanes of `active`: the normal matrix is that of
- * the goal (N x N), not that of the controls. Ends when `wanted` lanes are there. Adds the steps of each lane to `used`.
- */
-static void arrive(task *w, point *at, Mask active, int iterations, double enough, double damping, int wanted, int *used)
+/* Vectors in which `count` starts of a group lie. */
+static int packs_of(int count)
 {
-    V lambda = spread(damping);
-    Mask better = active & ~active;
-    int step, l;
-    linearise(w, at);
+    return (count + LANES - 1) / LANES;
+}
+
+/*
+ * Levenberg and Marquardt's steps from the `at` of each of a group's `count` starts, projected on the bounds: the normal matrix is that of
+ * the goal (N x N), not that of the controls. Ends when as many as are wanted are there. Adds the steps of each to `used`.
+ */
+static void arrive(task *w, int count, int *used)
+{
+    const programme *p = w->p;
+    const int packs = packs_of(count);
+    V lambda[PACKS];
+    Mask better[PACKS];
+    int iterations = p->reach_iterations, step, k, l;
+    for (k = 0; k < PACKS; ++k) {
+        lambda[k] = spread(p->damping);
+        better[k] = LESS(lambda[k], lambda[k]);
+    }
+    for (k = 0; k < packs; ++k) {
+        linearise(w + k, &w[k].at);
+    }
     for (step = 0; step < iterations; ++step) {
-        const Mask open = active & LESS(spread(enough), at->size) & LESS(lambda, spread(1e8));
-        int there = 0;
-        for (l = 0; l < LANES; ++l) {
-            there += LANE(at->size, l) <= enough;
+        Mask open[PACKS];
+        int there = 0, busy = 0;
+        for (k = 0; k < packs; ++k) {
+            open[k] = LESS(spread(p->enough), w[k].at.size) & LESS(lambda[k], spread(1e8));
+            busy |= any(open[k]);
         }
-        if (!any(open) || there >= wanted) {
+        for (l = 0; l < GROUP; ++l) { /* the last start counts for those that are missing */
+            const int from = l < count ? l : count - 1;
+            there += LANE(w[from / LANES].at.size, from % LANES) <= p->enough;
+        }
+        if (!busy || there >= p->wanted) {
             return;
         }
-        if (2 * there >= LANES && iterations > PATIENCE * (step + 1)) {
+        if (2 * there >= GROUP && iterations > PATIENCE * (step + 1)) {
             iterations = PATIENCE * (step + 1); /* enough to go on with: nobody waits for ever for a start that stalls */
         }
-        if (any(better)) { /* not before: the last steps need no derivative, nor do those that fail */
-            differentiate(w, &w->trial);
-            take_slopes(w, better, at, &w->trial);
-        }
-        damped_step(w, at, lambda, w->trial.u);
-        examine(w, &w->trial);
-        better = open & LESS(w->trial.size, at->size);
-        take(w, better, at, &w->trial);
-        lambda = SELECT(better, largest(0.2 * lambda, spread(1e-13)), 6.0 * lambda);
-        for (l = 0; l < LANES; ++l) {
-            used[l] += LANE(open, l) != 0;
+        for (k = 0; k < packs; ++k) {
+            task *const own = w + k;
+            if (!any(open[k])) {
+                continue;
+            }
+            if (any(better[k])) { /* not before: the last steps need no derivative, nor do those that fail */
+                differentiate(own, &own->trial);
+                take_slopes(own, better[k], &own->at, &own->trial);
+            }
+            damped_step(own, &own->at, lambda[k], own->trial.u);
+            examine(own, &own->trial);
+            better[k] = open[k] & LESS(own->trial.size, own->at.size);
+            take(own, better[k], &own->at, &own->trial);
+            lambda[k] = SELECT(better[k], largest(0.2 * lambda[k], spread(1e-13)), 6.0 * lambda[k]);
+            for (l = 0; l < LANES; ++l) {
+                used[k * LANES + l] += LANE(open[k], l) != 0;
+            }
         }
     }
 }
 
 /*
- * Undamped steps that bring controls near the goal back to it, in lanes of `active`, with the derivative J that is known nearby: it is kept as
- * long as it gets there in three more steps, since a residual alone costs a third; where the residual does not fall with a new
- * derivative, a lane gives up. Leaves no derivative.
+ * Undamped steps that bring the controls `at` near the goal back to it, in lanes of `active`, with the derivative that is `kept` nearby: it
+ * serves as long as all of a group get there in three more steps, since a residual alone costs a third; where the residual does not fall with
+ * a new derivative, a lane gives up. Leaves no derivative.
  */
-static void restore(task *w, point *at, const V *J, Mask active)
+static void restore(task *w, int packs, const Mask *active)
 {
-    int step, i, c, fresh = 0;
-    memcpy(at->J, J, (size_t)N * w->columns * sizeof *J);
-    examine(w, at);
-    if (any(active & LESS(spread(NEARBY), at->size))) {
-        differentiate(w, at);
-        fresh = 1;
+    Mask trusted[PACKS], open[PACKS], better[PACKS];
+    int step, i, k, c, fresh = 0;
+    memcpy(trusted, active, sizeof trusted);
+    for (k = 0; k < packs; ++k) {
+        if (any(active[k])) {
+            memcpy(w[k].at.J, w[k].kept.J, (size_t)N * w->columns * sizeof *w->at.J);
+            examine(w + k, &w[k].at);
+            fresh |= any(active[k] & LESS(spread(NEARBY), w[k].at.size));
+        }
+    }
+    for (k = 0; k < packs && fresh; ++k) {
+        if (any(active[k])) {
+            differentiate(w + k, &w[k].at);
+        }
     }
     for (step = 0; step < RESTORE; ++step) {
-        const Mask open = active & LESS(spread(w->p->enough), at->size);
-        Mask better;
-        V rate;
-        int slow;
-        if (!any(open)) {
+        int slow = 0, busy = 0;
+        for (k = 0; k < packs; ++k) {
+            task *const own = w + k;
+            point *const at = &own->at;
+            V rate;
+            open[k] = trusted[k] & LESS(spread(own->p->enough), at->size);
+            if (!any(open[k])) {
+                continue;
+            }
+            busy = 1;
+            damped_step(own, at, spread(1e-9), own->trial.u);
+            examine(own, &own->trial);
+            better[k] = open[k] & LESS(own->trial.size, at->size);
+            rate = own->trial.size / at->size;
+            slow |= any(open[k] & NOT(LESS(own->trial.size * rate * rate * rate, spread(own->p->enough))));
+            trusted[k] &= NOT(open[k]) | better[k] | (fresh ? NOT(open[k]) : open[k]);
+            at->size = SELECT(better[k], own->trial.size, at->size);
+            for (i = 0; i < N; ++i) {
+                at->r[i] = SELECT(better[k], own->trial.r[i], at->r[i]);
+            }
+            for (c = 0; c < own->columns; ++c) {
+                at->u[c] = SELECT(better[k], own->trial.u[c], at->u[c]);
+            }
+        }
+        if (!busy) {
             break;
         }
-        damped_step(w, at, spread(1e-9), w->trial.u);
-        examine(w, &w->trial);
-        better = open & LESS(w->trial.size, at->size);
-        rate = w->trial.size / at->size;
-        slow = any(open & NOT(LESS(w->trial.size * rate * rate * rate, spread(w->p->enough))));
-        active &= NOT(open) | better | (fresh ? NOT(open) : open);
-        at->size = SELECT(better, w->trial.size, at->size);
-        for (i = 0; i < N; ++i) {
-            at->r[i] = SELECT(better, w->trial.r[i], at->r[i]);
-        }
-        for (c = 0; c < w->columns; ++c) {
-            at->u[c] = SELECT(better, w->trial.u[c], at->u[c]);
-        }
         fresh = slow;
-        if (slow && any(open & NOT(better))) {
-            linearise(w, at);
-        } else if (slow) {
-            differentiate(w, at); /* the trial was at the same controls, in all lanes that still move */
+        for (k = 0; k < packs && slow; ++k) {
+            if (any(open[k] & NOT(better[k]))) {
+                linearise(w + k, &w[k].at);
+            } else if (any(open[k])) {
+                differentiate(w + k, &w[k].at); /* the trial was at the same controls, in all lanes that still move */
+            }
         }
     }
 }

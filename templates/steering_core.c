@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0 */
 /*
- * Minimum-energy steering by shooting on the Lie-Poisson equations: LANES starts at a time, in vectors of doubles where the
+ * Minimum-energy steering by shooting on the Lie-Poisson equations: GROUP starts side by side, in vectors of doubles where the
  * compiler has them. What belongs to one group and its controls (sizes, brackets, flows, names of the functions) stands in
  * steering_problem.h; what the functions do is said in the header that it includes.
  */
@@ -9,21 +9,39 @@
 #include <stdint.h>
 #include <string.h>
 
-/* LANES starts run side by side in one vector of doubles; other compilers run one start at a time. */
-#if defined(__GNUC__) && !defined(LIE_CODEGEN_ONE_LANE)
+/*
+ * LANES starts lie in one vector of doubles, as many as the processor's registers hold: wider ones cost several times as much. Other
+ * compilers have one start a vector. GROUP starts go on together and decide together when to stop, in as many vectors as that takes, so
+ * that the answers do not depend on LANES; LIE_CODEGEN_ONE_LANE saves memory by groups of one.
+ */
+#if defined(LIE_CODEGEN_ONE_LANE) || !defined(__GNUC__)
+#define LANES 1
+#elif defined(LIE_CODEGEN_LANES)
+#define LANES LIE_CODEGEN_LANES
+#elif defined(__AVX512F__)
 #define LANES 8
+#elif defined(__AVX__)
+#define LANES 4
+#else
+#define LANES 2
+#endif
+#if LANES > 1
 #define LANE(v, l) ((v)[l])
 #define LESS(a, b) ((K)((a) < (b)))
 #define SELECT(mask, a, b) ((V)(((mask) & (K)(a)) | (~(mask) & (K)(b))))
-typedef double V __attribute__((vector_size(64)));
-typedef int64_t K __attribute__((vector_size(64)));
+typedef double V __attribute__((vector_size(8 * LANES)));
+typedef int64_t K __attribute__((vector_size(8 * LANES)));
 #else
-#define LANES 1
 #define LANE(v, l) (*(&(v) + (l)))
 #define LESS(a, b) ((a) < (b))
 #define SELECT(mask, a, b) ((mask) ? (a) : (b))
 typedef double V;
 typedef int K;
+#endif
+#if defined(LIE_CODEGEN_ONE_LANE)
+#define GROUP 1
+#else
+#define GROUP 8
 #endif
 
 static void fill(V *v, int count, double value)
@@ -38,6 +56,7 @@ static void fill(V *v, int count, double value)
 #include "steering_problem.h"
 
 enum {
+    PACKS = GROUP / LANES, /* vectors of a group */
     WAVE = 2 * SEED_STEPS - 1,
     FLOW = N + SIZE, /* mu and X */
     ROWS = 8,        /* of the extrapolation: order 16 */
@@ -135,12 +154,14 @@ typedef struct {
     struct workspace *space;
 } problem;
 
-/* Sets one lane to the size r. */
+/* Sets one start of the group to the size r. */
 static void set_size(problem *task, int l, double r)
 {
     const double least = pow(1e-11, 1.0 / (double)DEPTH);
     double power[DEPTH + 1];
     int k;
+    task += l / LANES;
+    l %= LANES;
     LANE(task->radius, l) = r;
     r = r < 1.0 ? (r > least ? r : least) : 1.0;
     power[0] = 1.0;
@@ -179,14 +200,14 @@ typedef struct {
 
 /* All that is large: the caller's, or on the stack of the function that is called. */
 typedef struct workspace {
-    union {
+    union { /* of one vector of starts after the other */
         V mu[MOST_NODES + 1][N];            /* of an extremal, while its end is differentiated */
         V column[2 * SEED_STEPS + 1][N][N]; /* costates along a path of given controls, before that */
     } along;
-    V u[2 * SEED_STEPS + 1][M];      /* a first guess */
-    V change[2 * SEED_STEPS + 1][M]; /* of it, by relaxing */
-    point at, next;
-    candidates list[LANES];
+    V u[PACKS][2 * SEED_STEPS + 1][M];      /* first guesses */
+    V change[PACKS][2 * SEED_STEPS + 1][M]; /* of them, by relaxing */
+    point at[PACKS], next[PACKS];
+    candidates list[GROUP];
 } workspace;
 
 /* The header's size holds it wherever the memory begins; a negative size does not compile. */
@@ -429,108 +450,132 @@ static void newton_step(const problem *task, const point *at, const V *most, int
 /* When and where Levenberg-Marquardt stops. */
 typedef struct {
     int steps;     /* Runge-Kutta steps, even */
-    int *exact;    /* extrapolated steps, or NULL: the coarse grid alone */
+    int *exact;    /* (PACKS) extrapolated steps, or NULL: the coarse grid alone */
     int most;      /* iterations */
     double enough; /* coarse: decrease of F that is still predicted; exact: F, if not graded */
     double near;   /* coarse: F; exact: E */
-    int wanted;    /* lanes */
+    int wanted;    /* starts */
     int scaled;    /* Marquardt's damping */
 } rules;
 
-/*
- * Levenberg-Marquardt in every lane, from at->p; returns the number of linearisations. On the coarse grid a lane is done
- * when F is below `near`, its part along the group well below, and the decrease that is still predicted below `enough` (X
- * is not quite on the group there, so F itself does not vanish); on the exact flow when F is. It stops when `wanted` lanes are done, or all are done or
- * stalled, and after `most` iterations at the latest.
- */
-static int descend(const problem *task, const rules *rule, point *at, int *done)
+/* Whether one of the starts of that vector has something to do. */
+static int has_own(const int *own, int k)
 {
-    point *const next = &task->space->next;
-    V lambda, s[N], size, reach, decrease, scale, bound, clip, most, zero;
-    K better;
+    int l, found = 0;
+    for (l = 0; l < LANES; ++l) {
+        found |= own[k * LANES + l];
+    }
+    return found;
+}
+
+/*
+ * Levenberg-Marquardt in every lane, from at->p; returns the number of linearisations. On the coarse grid a start is done
+ * when F is below `near`, its part along the group well below, and the decrease that is still predicted below `enough` (X
+ * is not quite on the group there, so F itself does not vanish); on the exact flow when F is. It stops when `wanted` starts are done, or all
+ * are done or stalled, and after `most` iterations at the latest. Nobody waits for starts that are not `own`.
+ */
+static int descend(const problem *task, const rules *rule, const int *own, point *at, int *done)
+{
+    point *const next = task->space->next;
+    V lambda[PACKS], bound[PACKS], clip[PACKS], scale[PACKS], s[PACKS][N], zero;
     slopes kind = PLAIN;
-    int iteration, i, l, busy, finished, settle[LANES] = {0};
-    linearise(task, rule->steps, rule->exact, kind, at);
-    fill(&lambda, 1, rule->exact == NULL ? 1e-2 : 1e-12);
-    fill(&bound, 1, 1e-2);
-    fill(&clip, 1, 0.3);
+    int iteration, i, k, l, settle[GROUP] = {0};
+    fill(lambda, PACKS, rule->exact == NULL ? 1e-2 : 1e-12);
+    fill(bound, PACKS, 1e-2);
+    fill(clip, PACKS, 0.3);
+    fill(scale, PACKS, 0.0);
     fill(&zero, 1, 0.0);
-    scale = zero;
-    most = zero;
-    memset(next, 0, sizeof *next);
+    memset(next, 0, PACKS * sizeof *next);
+    memset(done, 0, GROUP * sizeof *done);
+    for (k = 0; k < PACKS; ++k) {
+        if (has_own(own, k)) {
+            linearise(task + k, rule->steps, rule->exact == NULL ? NULL : rule->exact + k, kind, at + k);
+        }
+    }
     for (iteration = 0;; ++iteration) {
         const int bold = rule->exact != NULL && iteration >= 6 && 4 * iteration < 3 * rule->most;
+        const int afresh = bold && kind != FINE;
         double open = 0.0;
-        reach = zero;
-        for (i = 0; i < N; ++i) {
-            reach += at->p[i] * at->p[i];
-        }
-        for (l = 0; l < LANES; ++l) {
-            LANE(most, l) = LANE(clip, l) * sqrt(LANE(reach, l));
-        }
-        if (bold && kind != FINE) {
-            kind = FINE;
-            linearise(task, rule->steps, rule->exact, kind, at);
-        }
-        if (bold) {
-            newton_step(task, at, &most, settle, s);
-        } else {
-            damped_step(at->H, at->g, &lambda, rule->scaled, s);
-        }
-        size = zero;
-        decrease = zero;
-        for (i = 0; i < N; ++i) {
-            size += s[i] * s[i];
-            decrease -= s[i] * at->g[i];
-        }
-        busy = 0;
-        finished = 0;
-        for (l = 0; l < LANES; ++l) {
-            const double F = LANE(at->F, l);
-            const double far = 1.0 + 0.5 * sqrt(LANE(reach, l));
-            const double length = sqrt(LANE(size, l));
-            if (rule->exact == NULL) {
-                done[l] = LANE(decrease, l) <= rule->enough && F <= rule->near && LANE(at->Z, l) <= 0.1 * rule->near;
+        int busy = 0, finished = 0;
+        for (k = 0; k < PACKS; ++k) {
+            V reach = zero, most = zero, size = zero, decrease = zero;
+            if (!has_own(own, k)) {
+                continue;
+            }
+            for (i = 0; i < N; ++i) {
+                reach += at[k].p[i] * at[k].p[i];
+            }
+            for (l = 0; l < LANES; ++l) {
+                LANE(most, l) = LANE(clip[k], l) * sqrt(LANE(reach, l));
+            }
+            if (afresh) {
+                linearise(task + k, rule->steps, rule->exact + k, FINE, at + k);
+            }
+            if (bold) {
+                newton_step(task + k, at + k, &most, settle + k * LANES, s[k]);
             } else {
-                done[l] = F <= (LANE(task->graded, l) > 0.0 ? 1e-20 + LANE(task->floor, l) : rule->enough)
-                    && LANE(at->E, l) <= rule->near;
+                damped_step(at[k].H, at[k].g, lambda + k, rule->scaled, s[k]);
             }
-            finished += done[l];
-            if (!done[l] && (bold || LANE(lambda, l) < MOST_DAMPING)) {
-                ++busy;
-                open = fmax(open, F);
+            for (i = 0; i < N; ++i) {
+                size += s[k][i] * s[k][i];
+                decrease -= s[k][i] * at[k].g[i];
             }
-            LANE(scale, l) = length > far ? far / length : 1.0;
+            for (l = 0; l < LANES; ++l) {
+                const double F = LANE(at[k].F, l);
+                const double far = 1.0 + 0.5 * sqrt(LANE(reach, l));
+                const double length = sqrt(LANE(size, l));
+                const int mine = own[k * LANES + l];
+                int there;
+                if (rule->exact == NULL) {
+                    there = LANE(decrease, l) <= rule->enough && F <= rule->near && LANE(at[k].Z, l) <= 0.1 * rule->near;
+                } else {
+                    there = F <= (LANE(task[k].graded, l) > 0.0 ? 1e-20 + LANE(task[k].floor, l) : rule->enough)
+                        && LANE(at[k].E, l) <= rule->near;
+                }
+                done[k * LANES + l] = there;
+                finished += mine && there;
+                if (mine && !there && (bold || LANE(lambda[k], l) < MOST_DAMPING)) {
+                    ++busy;
+                    open = fmax(open, F);
+                }
+                LANE(scale[k], l) = length > far ? far / length : 1.0;
+            }
         }
         if (busy == 0 || finished >= rule->wanted || iteration == rule->most) {
             return iteration + 1;
         }
-        for (i = 0; i < N; ++i) {
-            next->p[i] = at->p[i] + scale * s[i];
-        }
         /* near the end the last Jacobian serves, but not twice */
         kind = bold ? FINE : rule->exact != NULL && kind != KNOWN && open < 1e-10 ? KNOWN : PLAIN;
-        if (kind == KNOWN) {
-            memcpy(next->xi, at->xi, sizeof next->xi);
-        }
-        linearise(task, rule->steps, rule->exact, kind, next);
-        better = LESS(next->F, bold ? bound : at->F);
-        for (l = 0; l < LANES; ++l) {
-            const double gain = LANE(next->F, l) / LANE(at->F, l);
-            if (bold) {
-                if (LANE(next->F, l) < LANE(bound, l)) {
-                    LANE(clip, l) = fmin(0.3, 1.5 * LANE(clip, l));
-                } else {
-                    LANE(clip, l) *= 0.3;
-                    settle[l] = 0;
-                }
-            } else if (gain < 1.0) {
-                LANE(lambda, l) *= gain < 0.25 ? 0.05 : gain < 0.75 ? 0.3 : 1.0;
-            } else {
-                LANE(lambda, l) = fmax(LANE(lambda, l) * 8.0, 1e-8);
+        for (k = 0; k < PACKS; ++k) {
+            K better;
+            if (!has_own(own, k)) {
+                continue;
             }
+            for (i = 0; i < N; ++i) {
+                next[k].p[i] = at[k].p[i] + scale[k] * s[k][i];
+            }
+            if (kind == KNOWN) {
+                memcpy(next[k].xi, at[k].xi, sizeof next[k].xi);
+            }
+            linearise(task + k, rule->steps, rule->exact == NULL ? NULL : rule->exact + k, kind, next + k);
+            better = LESS(next[k].F, bold ? bound[k] : at[k].F);
+            for (l = 0; l < LANES; ++l) {
+                const double gain = LANE(next[k].F, l) / LANE(at[k].F, l);
+                if (bold) {
+                    if (LANE(next[k].F, l) < LANE(bound[k], l)) {
+                        LANE(clip[k], l) = fmin(0.3, 1.5 * LANE(clip[k], l));
+                    } else {
+                        LANE(clip[k], l) *= 0.3;
+                        settle[k * LANES + l] = 0;
+                    }
+                } else if (gain < 1.0) {
+                    LANE(lambda[k], l) *= gain < 0.25 ? 0.05 : gain < 0.75 ? 0.3 : 1.0;
+                } else {
+                    LANE(lambda[k], l) = fmax(LANE(lambda[k], l) * 8.0, 1e-8);
+                }
+            }
+            take(&better, at + k, next + k);
         }
-        take(&better, at, next);
     }
 }
 
@@ -544,58 +589,69 @@ static double uniform(uint64_t *state)
 }
 
 /*
- * Coordinates of the target's logarithm, the shortest that is found from a guess in each lane; near enough for a first
+ * Coordinates of the target's logarithm, the shortest that is found from a guess in each lane of a group; near enough for a first
  * guess of controls. First order where none is found.
  */
 static void logarithm(const V *target, V *x)
 {
     V Y[SIZE], theta[N], delta[N], back[N], far;
     uint64_t state = UINT64_C(0x9E3779B97F4A7C15);
-    double shortest = HUGE_VAL;
-    int iteration, i, l, part, best = -1;
+    double guess[N][GROUP], best[N], shortest = HUGE_VAL;
+    int iteration, i, k, l, part;
+    offset(target, delta);
     /* Not from 0: half a turn has no first-order offset there. */
     for (i = 0; i < N; ++i) {
-        fill(x + i, 1, 0.05 * (1.0 + i) / (double)N);
-        for (l = 1; l < LANES; ++l) {
-            LANE(x[i], l) = 2.0 * uniform(&state);
+        best[i] = LANE(delta[i], 0) + 0.5 * (1.0 + i) / (double)N;
+        guess[i][0] = 0.05 * (1.0 + i) / (double)N;
+        for (l = 1; l < GROUP; ++l) {
+            guess[i][l] = 2.0 * uniform(&state);
         }
     }
-    fill(&far, 1, 0.0);
-    for (iteration = 0; iteration < 6; ++iteration) {
-        memcpy(Y, target, sizeof Y);
+    for (k = 0; k < PACKS; ++k) {
         for (i = 0; i < N; ++i) {
-            theta[i] = -0.25 * x[i];
+            fill(x + i, 1, 0.0);
+            for (l = 0; l < LANES; ++l) {
+                LANE(x[i], l) = guess[i][k * LANES + l];
+            }
         }
-        for (part = 0; part < 4; ++part) {
-            advance(Y, theta, Y);
+        for (iteration = 0; iteration < 6; ++iteration) {
+            memcpy(Y, target, sizeof Y);
+            for (i = 0; i < N; ++i) {
+                theta[i] = -0.25 * x[i];
+            }
+            for (part = 0; part < 4; ++part) {
+                advance(Y, theta, Y);
+            }
+            offset(Y, delta);
+            for (i = 0; i < N; ++i) {
+                delta[i] = -delta[i];
+                back[i] = -x[i];
+            }
+            correction(back, delta, theta);
+            for (i = 0; i < N; ++i) {
+                x[i] = -theta[i];
+            }
         }
-        offset(Y, delta);
-        for (i = 0; i < N; ++i) {
-            delta[i] = -delta[i];
-            back[i] = -x[i];
+        fill(&far, 1, 0.0);
+        for (i = 0; i < SIZE; ++i) {
+            const V difference = Y[i] - identity[i];
+            far += difference * difference;
         }
-        correction(back, delta, theta);
-        for (i = 0; i < N; ++i) {
-            x[i] = -theta[i];
+        for (l = 0; l < LANES; ++l) {
+            double size = 0.0;
+            for (i = 0; i < N; ++i) {
+                size += LANE(x[i], l) * LANE(x[i], l);
+            }
+            if (size < 0.999 * shortest && size < 400.0 && LANE(far, l) < 0.01) {
+                shortest = size;
+                for (i = 0; i < N; ++i) {
+                    best[i] = LANE(x[i], l);
+                }
+            }
         }
     }
-    for (i = 0; i < SIZE; ++i) {
-        const V difference = Y[i] - identity[i];
-        far += difference * difference;
-    }
-    for (l = 0; l < LANES; ++l) {
-        double size = 0.0;
-        for (i = 0; i < N; ++i) {
-            size += LANE(x[i], l) * LANE(x[i], l);
-        }
-        if (size < 0.999 * shortest && size < 400.0 && LANE(far, l) < 0.01) {
-            shortest = size;
-            best = l;
-        }
-    }
-    offset(target, delta);
     for (i = 0; i < N; ++i) {
-        fill(x + i, 1, best >= 0 ? LANE(x[i], best) : LANE(delta[i], 0) + 0.5 * (1.0 + i) / (double)N);
+        fill(x + i, 1, best[i]);
     }
 }
 
@@ -748,62 +804,74 @@ static void path_along(V (*u)[M], V *X)
 /*
  * Gauss and Newton in the controls: the controls of least energy among those that, to first order, end at the target, are
  * u_i(t) = <mu(t), A_i> / w_i along the path as it is, and half a step is made towards them. Far more forgiving than
- * shooting where brackets of brackets are needed, and its fixed points are the extremals; p is their costate.
+ * shooting where brackets of brackets are needed, and its fixed points are the extremals; p is their costate. Returns the share of `change`
+ * to take; *open counts the starts that are not there yet.
  */
-static void relax(const problem *task, int most, V (*u)[M], V *p)
+static V relaxing_step(const problem *task, V (*u)[M], V (*change)[M], V *p, int *open)
 {
-    V(*column)[N][N] = task->space->along.column, (*change)[M] = task->space->change, X[SIZE];
+    V(*column)[N][N] = task->space->along.column, X[SIZE];
     V H[N * N], G[N * N], g[N], q[N], z[N], E, lambda, error, step, length;
     V zero = {0.0}, scale = {0.0};
-    int iteration, t, c, i, l, open;
-    fill(&lambda, 1, 1e-6);
-    for (iteration = 0;; ++iteration) {
-        costates_along(task, u, column);
-        normal_equations(task, u, column, H, g);
-        path_along(u, X);
-        /* z: coordinates of the error at the end; what is missing, carried to the origin, is Ad_X(1) z */
-        endpoint(task->target, X, &E, q, G);
-        damped_step(G, q, &zero, 0, z);
-        error = zero;
+    int t, c, i, l;
+    costates_along(task, u, column);
+    normal_equations(task, u, column, H, g);
+    path_along(u, X);
+    /* z: coordinates of the error at the end; what is missing, carried to the origin, is Ad_X(1) z */
+    endpoint(task->target, X, &E, q, G);
+    damped_step(G, q, &zero, 0, z);
+    error = zero;
+    for (i = 0; i < N; ++i) {
+        error += task->row[i] * z[i] * z[i];
+    }
+    for (l = 0; l < LANES; ++l) {
+        LANE(scale, l) = LANE(error, l) > 1.0 ? 1.0 / sqrt(LANE(error, l)) : 1.0;
+    }
+    for (c = 0; c < N; ++c) {
         for (i = 0; i < N; ++i) {
-            error += task->row[i] * z[i] * z[i];
+            g[c] -= scale * column[2 * SEED_STEPS][c][i] * z[i];
         }
-        scale = zero;
-        for (l = 0; l < LANES; ++l) {
-            LANE(scale, l) = LANE(error, l) > 1.0 ? 1.0 / sqrt(LANE(error, l)) : 1.0;
-        }
-        for (c = 0; c < N; ++c) {
-            for (i = 0; i < N; ++i) {
-                g[c] -= scale * column[2 * SEED_STEPS][c][i] * z[i];
+    }
+    fill(&lambda, 1, 1e-6);
+    damped_step(H, g, &lambda, 0, p);
+    step = zero;
+    length = zero;
+    for (t = 0; t <= 2 * SEED_STEPS; ++t) {
+        for (i = 0; i < M; ++i) {
+            V sum = p[0] * column[t][0][control_of[i]];
+            for (c = 1; c < N; ++c) {
+                sum += p[c] * column[t][c][control_of[i]];
             }
+            change[t][i] = task->inverse_weights[i] * sum - u[t][i];
+            step += (0.5 / (double)SEED_STEPS) * change[t][i] * change[t][i];
+            length += (0.5 / (double)SEED_STEPS) * u[t][i] * u[t][i];
         }
-        damped_step(H, g, &lambda, 0, p);
-        step = zero;
-        length = zero;
-        for (t = 0; t <= 2 * SEED_STEPS; ++t) {
-            for (i = 0; i < M; ++i) {
-                V sum = p[0] * column[t][0][control_of[i]];
-                for (c = 1; c < N; ++c) {
-                    sum += p[c] * column[t][c][control_of[i]];
-                }
-                change[t][i] = task->inverse_weights[i] * sum - u[t][i];
-                step += (0.5 / (double)SEED_STEPS) * change[t][i] * change[t][i];
-                length += (0.5 / (double)SEED_STEPS) * u[t][i] * u[t][i];
-            }
+    }
+    for (l = 0; l < LANES; ++l) {
+        const double reach = sqrt(LANE(length, l)) + LANE(task->size, l), far = sqrt(LANE(step, l));
+        LANE(scale, l) = far > reach ? 0.5 * reach / far : 0.5;
+        *open += !(LANE(error, l) < 1e-4 && far < 0.05 * reach);
+    }
+    return scale;
+}
+
+/* Such steps of all starts of a group, until three quarters of them are there. */
+static void relax(const problem *task, int most, V (*u)[2 * SEED_STEPS + 1][M], point *at)
+{
+    V(*change)[2 * SEED_STEPS + 1][M] = task->space->change, scale[PACKS];
+    int iteration, k, t, i;
+    for (iteration = 0;; ++iteration) {
+        int open = 0;
+        for (k = 0; k < PACKS; ++k) {
+            scale[k] = relaxing_step(task + k, u[k], change[k], at[k].p, &open);
         }
-        open = 0;
-        scale = zero;
-        for (l = 0; l < LANES; ++l) {
-            const double reach = sqrt(LANE(length, l)) + LANE(task->size, l), far = sqrt(LANE(step, l));
-            LANE(scale, l) = far > reach ? 0.5 * reach / far : 0.5;
-            open += !(LANE(error, l) < 1e-4 && far < 0.05 * reach);
-        }
-        if (open <= LANES / 4 || iteration == most) {
+        if (open <= GROUP / 4 || iteration == most) {
             return;
         }
-        for (t = 0; t <= 2 * SEED_STEPS; ++t) {
-            for (i = 0; i < M; ++i) {
-                u[t][i] += scale * change[t][i];
+        for (k = 0; k < PACKS; ++k) {
+            for (t = 0; t <= 2 * SEED_STEPS; ++t) {
+                for (i = 0; i < M; ++i) {
+                    u[k][t][i] += scale[k] * change[k][t][i];
+                }
             }
         }
     }
@@ -894,7 +962,7 @@ static void begin(problem *task, V *x, candidates *list)
     for (i = 0; i < N; ++i) {
         r = fmax(r, pow(fabs(LANE(x[i], 0)), 1.0 / length_of[i]));
     }
-    for (l = 0; l < LANES; ++l) {
+    for (l = 0; l < GROUP; ++l) {
         set_size(task, l, r);
     }
     list->size = r;
@@ -909,11 +977,11 @@ static void begin(problem *task, V *x, candidates *list)
 static void search(problem *task, const steering_options *options, int first, int last, int relaxed, int again,
     candidates *list, steering_result *result)
 {
-    V x[N], (*u)[M] = task->space->u;
+    V x[N], (*u)[2 * SEED_STEPS + 1][M] = task->space->u;
     rules rule;
-    point *const at = &task->space->at;
+    point *const at = task->space->at;
     double size = 0.0;
-    int l, i, done[LANES];
+    int l, k, i, own[GROUP], done[GROUP];
     begin(task, x, list);
     for (i = 0; i < SIZE; ++i) {
         size += (LANE(task->target[i], 0) - identity[i]) * (LANE(task->target[i], 0) - identity[i]);
@@ -924,23 +992,31 @@ static void search(problem *task, const steering_options *options, int first, in
     rule.most = options->search_iterations;
     rule.enough = size * options->search_tolerance;
     rule.near = SEARCH_RESIDUAL * size;
-    rule.wanted = LANES - LANES / 4; /* the slowest quarter is not waited for */
-    memset(at, 0, sizeof *at);
-    for (; first < last || (list->count == 0 && first < 4 * last); first += LANES) {
-        area_rule(task, x, first, u);
-        if (relaxed || first >= last) {
-            relax(task, RELAXATIONS, u, at->p);
-        } else {
-            nearest_costate(task, u, at->p);
+    rule.wanted = GROUP - GROUP / 4; /* the slowest quarter is not waited for */
+    memset(at, 0, PACKS * sizeof *at);
+    for (l = 0; l < GROUP; ++l) {
+        own[l] = 1;
+    }
+    for (; first < last || (list->count == 0 && first < 4 * last); first += GROUP) {
+        const int relaxing = relaxed || first >= last;
+        for (k = 0; k < PACKS; ++k) {
+            area_rule(task, x, first + k * LANES, u[k]);
+            if (!relaxing) {
+                nearest_costate(task + k, u[k], at[k].p);
+            }
+        }
+        if (relaxing) {
+            relax(task, RELAXATIONS, u, at);
         }
         rule.scaled = IS_DEEP && (first / 8) % 2 != 0;
-        result->linearisations += descend(task, &rule, at, done);
-        for (l = 0; l < LANES && (first + l < last || first >= last); ++l) {
-            const int loose = LANE(at->Z, l) > 1e-6 * size;
+        result->linearisations += descend(task, &rule, own, at, done);
+        for (l = 0; l < GROUP && (first + l < last || first >= last); ++l) {
+            const point *here = at + l / LANES;
+            const int loose = LANE(here->Z, l % LANES) > 1e-6 * size;
             ++result->starts;
-            if (done[l] && !(loose && again && LANE(task->graded, l) == 0.0)) {
+            if (done[l] && !(loose && again && LANE(task->graded, 0) == 0.0)) {
                 ++result->converged;
-                keep(list, energy_of(task, at->p, l), loose, at, l);
+                keep(list, energy_of(task, here->p, l % LANES), loose, here, l % LANES);
             }
         }
     }
@@ -953,23 +1029,26 @@ static void search(problem *task, const steering_options *options, int first, in
 static void polish(int count, const double *targets, problem *task, const steering_options *options,
     const candidates *list, steering_result *results)
 {
-    const int each = LANES / count;
+    const int each = GROUP / count;
     const double near = options->tolerance * options->tolerance;
     rules rule;
-    point *const at = &task->space->at;
-    int i, l, c, done, spent, steps = 2, ready[LANES], own[LANES];
-    memset(at, 0, sizeof *at);
+    point *const at = task->space->at;
+    int i, l, c, done, spent, steps[PACKS], ready[GROUP], own[GROUP];
+    memset(at, 0, PACKS * sizeof *at);
+    for (i = 0; i < PACKS; ++i) {
+        steps[i] = 2;
+    }
     rule.steps = even(options->polish_steps);
-    rule.exact = &steps;
+    rule.exact = steps;
     rule.most = options->polish_iterations;
     rule.enough = POLISH_SHARE * near;
     rule.near = near;
-    rule.wanted = LANES;
+    rule.wanted = GROUP;
     rule.scaled = 1;
     for (done = 0; done < 2 * KEPT; done += each) {
         const double dear = done < KEPT ? 1.1 : HUGE_VAL;
         int open = 0;
-        for (l = 0; l < LANES; ++l) {
+        for (l = 0; l < GROUP; ++l) {
             const int of = l / each < count ? l / each : count - 1;
             const candidates *from = list + of;
             const int which = done % KEPT + l % each;
@@ -979,21 +1058,24 @@ static void polish(int count, const double *targets, problem *task, const steeri
             open = open || own[l];
             set_size(task, l, from->size);
             for (i = 0; i < N; ++i) {
-                LANE(at->p[i], l) = from->count == 0 ? 0.0 : from->p[own[l] ? which : 0][i];
+                LANE(at[l / LANES].p[i], l % LANES) = from->count == 0 ? 0.0 : from->p[own[l] ? which : 0][i];
             }
             for (i = 0; i < SIZE; ++i) {
-                LANE(task->target[i], l) = targets[of * SIZE + i];
+                LANE(task[l / LANES].target[i], l % LANES) = targets[of * SIZE + i];
             }
         }
         if (!open) {
             continue;
         }
-        spent = descend(task, &rule, at, ready);
-        for (l = 0; l < LANES; ++l) {
+        spent = descend(task, &rule, own, at, ready);
+        for (l = 0; l < GROUP; ++l) {
             steering_result *result = results + l / each;
-            const double E = LANE(at->E, l), F = LANE(at->F, l);
-            const int good = E <= near && (E == F || F <= 1e-14 + 1e2 * LANE(task->floor, l));
-            const double energy = energy_of(task, at->p, l);
+            const point *here = at + l / LANES;
+            const problem *of = task + l / LANES;
+            const int lane = l % LANES;
+            const double E = LANE(here->E, lane), F = LANE(here->F, lane);
+            const int good = E <= near && (E == F || F <= 1e-14 + 1e2 * LANE(of->floor, lane));
+            const double energy = energy_of(of, here->p, lane);
             if (!own[l]) {
                 continue;
             }
@@ -1006,9 +1088,9 @@ static void polish(int count, const double *targets, problem *task, const steeri
                 result->cost = energy;
                 result->residual = sqrt(E);
                 for (i = 0; i < N; ++i) {
-                    result->mu0[i] = LANE(task->column[i], l) * LANE(at->p[i], l);
+                    result->mu0[i] = LANE(of->column[i], lane) * LANE(here->p[i], lane);
                     for (c = 0; c < N; ++c) {
-                        result->jacobian[i][c] = LANE(at->xi[c][i], l) / LANE(task->column[c], l);
+                        result->jacobian[i][c] = LANE(here->xi[c][i], lane) / LANE(of->column[c], lane);
                     }
                 }
             }
@@ -1017,25 +1099,27 @@ static void polish(int count, const double *targets, problem *task, const steeri
 }
 
 /*
- * Solves `count` <= LANES targets: searches each, polishes the best candidates of all side by side, and goes on once with
+ * Solves `count` <= GROUP targets: searches each, polishes the best candidates of all side by side, and goes on once with
  * those that are not solved.
  */
 static void solve_some(int count, const double *targets, const double *weights, const steering_options *options,
     steering_result *results, workspace *space)
 {
-    problem task;
+    problem task[PACKS];
     candidates *const list = space->list;
     double mean = 1.0, least = HUGE_VAL, largest = 0.0;
     int i, k, c, attempt, open, starts = options->starts;
-    memset(&task, 0, sizeof task);
-    task.space = space;
+    memset(task, 0, sizeof task);
     for (i = 0; i < M; ++i) {
         mean *= pow(weights[i], 1.0 / (double)M);
         least = fmin(least, weights[i]);
         largest = fmax(largest, weights[i]);
     }
-    for (i = 0; i < M; ++i) {
-        fill(task.inverse_weights + i, 1, mean / weights[i]);
+    for (k = 0; k < PACKS; ++k) {
+        task[k].space = space;
+        for (i = 0; i < M; ++i) {
+            fill(task[k].inverse_weights + i, 1, mean / weights[i]);
+        }
     }
     starts *= largest > 2.0 * least ? 2 : 1;
     for (attempt = 0; attempt < 2; ++attempt) {
@@ -1049,16 +1133,18 @@ static void solve_some(int count, const double *targets, const double *weights, 
             }
             if (result->status != STEERING_SOLVED) {
                 open = 1;
-                for (i = 0; i < SIZE; ++i) {
-                    fill(task.target + i, 1, targets[k * SIZE + i]);
+                for (c = 0; c < PACKS; ++c) {
+                    for (i = 0; i < SIZE; ++i) {
+                        fill(task[c].target + i, 1, targets[k * SIZE + i]);
+                    }
                 }
-                search(&task, options, result->starts, (attempt == 0 ? 1 : 4) * starts,
+                search(task, options, result->starts, (attempt == 0 ? 1 : 4) * starts,
                     IS_DEEP || attempt > 0 || largest > 2.0 * least, attempt,
                     list + k, result);
             }
         }
         if (open) {
-            polish(count, targets, &task, options, list, results);
+            polish(count, targets, task, options, list, results);
         }
     }
     for (k = 0; k < count; ++k) {
@@ -1124,10 +1210,10 @@ static void refuse(steering_result *result)
 static void solve_all(workspace *space, int count, const double *targets, const double weights[M],
     const steering_options *options, steering_result *results)
 {
-    double packed[LANES * SIZE];
+    double packed[GROUP * SIZE];
     int k, i, next;
-    for (k = 0; k < count; k += LANES) {
-        const int some = count - k < LANES ? count - k : LANES;
+    for (k = 0; k < count; k += GROUP) {
+        const int some = count - k < GROUP ? count - k : GROUP;
         int any = 0;
         for (next = 0; next < some; ++next) {
             /* one that cannot be used stands in as the identity, so that its neighbours' lanes are what they would be */

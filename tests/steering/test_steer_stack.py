@@ -99,7 +99,7 @@ def compile_core(name: str, controls: tuple[str | int, ...], lanes: int, level: 
 
 
 def width(lanes: int) -> list[str]:
-    return ["-DLIE_CODEGEN_ONE_LANE"] if lanes == 1 else []
+    return ["-DLIE_CODEGEN_ONE_LANE" if lanes == 1 else f"-DLIE_CODEGEN_LANES={lanes}"]
 
 
 def gcc(*arguments: str, folder: Path) -> None:

@@ -13,14 +13,14 @@ from lie_codegen.codegen.frames import FRAME, LIBRARY
 if TYPE_CHECKING:
     from lie_codegen.steering.shooting.views import SteeringView
 
-#: As in steering_core.c: lanes where the compiler has vectors, Runge-Kutta steps and candidates kept, rows of the extrapolation.
+#: As in steering_core.c: starts of a group, in vectors of any width that divides it, Runge-Kutta steps and candidates kept, rows of the extrapolation.
 LANES, _NODES, _KEPT, _ROWS = 8, 129, 8, 8
 #: Twelve frames deep.
 _FRAMES = 12 * FRAME
 
 
 def workspace_bytes(view: SteeringView, lanes: int) -> int:
-    """Bytes of memory that `<prefix>_solve_in` asks for, with eight lanes or one: all large arrays, wherever the memory begins."""
+    """Bytes of memory that `<prefix>_solve_in` asks for, with eight starts at a time or one: all large arrays, wherever the memory begins."""
     n, m = view.dim, len(view.controls)
     nodes = 2 * view.seed_steps + 1
     vectors = max(_NODES * n, nodes * n * n) + 2 * nodes * m + 2 * _point(n)
@@ -30,7 +30,7 @@ def workspace_bytes(view: SteeringView, lanes: int) -> int:
 
 
 def stack_bytes(view: SteeringView, lanes: int, *, in_workspace: bool = False) -> int:
-    """Bytes of stack of `<prefix>_solve`, with eight lanes or one; or of `<prefix>_solve_in`."""
+    """Bytes of stack of `<prefix>_solve`, with eight starts at a time or one; or of `<prefix>_solve_in`."""
     n, m, size = view.dim, len(view.controls), view.size
     kernel = max(len(each.statements) for each in view.kernels)
     damped = n * n + 2 * n + 4
