@@ -4,13 +4,28 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 #: What holds neither: most arguments are of these classes, and are passed over.
 _WITHOUT_MASKS = frozenset({bool, int, float, complex, str, bytes, type(None)})
 
+_ARE_WITHOUT_MASKS = _WITHOUT_MASKS.issuperset
+
 _HOLDERS = (list, tuple, dict)
+
+
+def would_lose_parts(args: tuple[Any, ...], named: Mapping[str, Any]) -> bool:
+    """Whether arguments have masks, which every call of the public interface asks; that imaginary parts are refused is seen to as well.
+
+    Most calls are told by the classes of their arguments, in a quarter of a microsecond.
+    """
+    filters = warnings.filters
+    if not filters or filters[0] is not _entry[0]:
+        refuse_lost_parts()
+    if _ARE_WITHOUT_MASKS(map(type, args)) and (not named or _ARE_WITHOUT_MASKS(map(type, named.values()))):
+        return False
+    return has_masks([*args, *named.values()])
 
 
 def has_masks(values: Collection[Any]) -> bool:
@@ -19,13 +34,12 @@ def has_masks(values: Collection[Any]) -> bool:
 
     numpy drops the mask where numbers are asked for, and what lay below it counts.
     """
-    # Every call of the public interface comes by here; without numpy.ma nobody can have made one.
-    if "numpy.ma" not in sys.modules or _WITHOUT_MASKS.issuperset(map(type, values)):
+    if "numpy.ma" not in sys.modules:  # then nobody can have made one
         return False
     masked = sys.modules["numpy.ma"]
     for value in values:
         if isinstance(value, _HOLDERS):
-            if not _WITHOUT_MASKS.issuperset(map(type, value.values() if isinstance(value, dict) else value)):
+            if not _ARE_WITHOUT_MASKS(map(type, value.values() if isinstance(value, dict) else value)):
                 return _holds_masks(list(values))
         elif type(value) not in _WITHOUT_MASKS and (_holds_others(value) or isinstance(value, masked.MaskedArray)):
             return _holds_masks(list(values))
@@ -60,12 +74,11 @@ def refuse_lost_parts() -> None:
     sees all of these. The user's own lines warn as before: the entry among the filters of warnings is for our modules. It is put in front
     again where others came before it, for to ignore warnings is not to agree to other numbers.
     """
-    if not warnings.filters or warnings.filters[0] is not _entry[0]:
-        import numpy as np
+    import numpy as np
 
-        # filterwarnings puts an equal entry from behind to the front, so that there is never more than one
-        warnings.filterwarnings("error", category=np.exceptions.ComplexWarning, module=r"lie_codegen\b")
-        _entry[0] = warnings.filters[0]
+    # filterwarnings puts an equal entry from behind to the front, so that there is never more than one
+    warnings.filterwarnings("error", category=np.exceptions.ComplexWarning, module=r"lie_codegen\b")
+    _entry[0] = warnings.filters[0]
 
 
 def loses_parts(error: BaseException) -> bool:

@@ -8,7 +8,8 @@ Lyndon, Ann. Math. 68 (1958) 81), so their images span every layer of a Lie alge
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from lie_codegen.light_dataclass import dataclass
 
 Word = tuple[int, ...]
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol, runtime_checkable
 
 from lie_codegen.kernel.kernel import Kernel
+from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

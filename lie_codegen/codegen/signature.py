@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from lie_codegen.kernel.kernel import Kernel, Port
+from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ Row 5 is printed with (R + R_d)(p - p_d), which is not compatible with (1, 0); t
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -83,6 +82,8 @@ def catalogue_error(group: MatrixGroup, name: str, gains: Gains) -> ErrorFunctio
     """
     known = (*error_names(group), *_geodesic_names(group))
     if name not in known:
+        import difflib
+
         close = difflib.get_close_matches(str(name), known, n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
         raise InputError(f"no error function {name!r} on {group.name}; known there: {', '.join(known)}{hint}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,8 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
+from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
-from lie_codegen.signals.resolved_input import resolve_function
 
 #: How far a value that is asked for alone may lie from the same among others, relative to the largest.
 _ALIKE = 1e-13
@@ -84,6 +83,8 @@ def as_drive(
     """
     if signal.formula is not None:
         return formula_drive(signal.formula, eps)
+    from lie_codegen.signals.resolved_input import resolve_function
+
     found = resolve_function(
         signal.evaluate, float(t[0]), float(t[-1]), tolerance=0.2 * rtol / max(float(np.max(np.abs(eps))), 1e-300),
         resolution=resolution, breakpoints=signal.breakpoints, where=f"simulate({group.name})",

@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import InputError
+from lie_codegen.flow.simulate_arguments import FOURTH_ORDER
 from lie_codegen.groups.build import build
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.build import build_kernels
@@ -34,10 +35,6 @@ def integrators(group: MatrixGroup) -> Library:
 def logarithms(group: MatrixGroup) -> Library:
     """exp and log of the group, compiled when first called."""
     return build(group)
-
-
-#: The methods of fourth order of `lc.simulate`.
-FOURTH_ORDER = ("rkmk4", "commutator_free")
 
 
 def step_of(group: MatrixGroup, method: str) -> Compiled[Any]:

@@ -32,7 +32,7 @@ from lie_codegen.flow.simulate_arguments import check_precision, check_tolerance
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.signals.parametric_input import ParametricInput
+from lie_codegen.signals.parametric_input import ParametricInput, parameter_values
 from lie_codegen.signals.sampled_input import SampledInput
 
 _LARGEST_POWER = 10**12
@@ -162,7 +162,7 @@ class Propagator(Saved):
         """
         where = f"propagator({self.group.name})"
         if isinstance(self.u, ParametricInput):
-            values = self.u.values(parameters)
+            values = parameter_values(self.u.parameters, parameters)
             length = self.u.period_of(values)[0] if self.duration == "period" else float(self.duration)
             named = dict(zip(self.u.parameters, values, strict=True))
             if self._wave_runs is not None and self.u.waves is not None:
@@ -210,7 +210,7 @@ class Propagator(Saved):
         single = check_precision(where, precision)
         if not isinstance(self.u, ParametricInput):
             raise InputError(f"{where}: the input has no parameters; give a lc.ParametricInput")
-        values = self.u.values(parameters, many=True)
+        values = parameter_values(self.u.parameters, parameters, many=True)
         counts = sorted({len(value) for value in values if isinstance(value, np.ndarray)})
         if len(counts) > 1:
             raise ShapeError(f"{where}: the parameters have lengths {', '.join(map(str, counts))}; give one N")

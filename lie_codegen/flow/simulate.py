@@ -14,11 +14,10 @@ from lie_codegen.errors import InputError, ShapeError, SlowWarning
 from lie_codegen.flow.events import Event, EventHits
 from lie_codegen.flow.feedback_law import Feedback, as_feedback
 from lie_codegen.flow.inputs import Signal, as_drive, as_signal, drive_signal
-from lie_codegen.flow.libraries import FOURTH_ORDER, step_of
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.run import SINGLE_GOAL, MagnusRun, fixed_run, magnus_run, order_for
-from lie_codegen.flow.refined import refined
 from lie_codegen.flow.simulate_arguments import (
+    FOURTH_ORDER,
     check_precision,
     check_single,
     check_times,
@@ -200,6 +199,9 @@ def _fourth_order(
     threads: int,
 ) -> MagnusRun:  # fmt: skip
     """A run by steps of the fourth order, halved until two runs agree."""
+    from lie_codegen.flow.libraries import step_of
+    from lie_codegen.flow.refined import refined
+
     # A function is read from its pieces here too, so that no method meets an alias of it; they hold eps already.
     read = signal if signal.formula is not None else drive_signal(drive, times)
     scale = eps if signal.formula is not None else np.ones_like(eps)

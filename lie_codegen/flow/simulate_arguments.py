@@ -14,9 +14,10 @@ from lie_codegen.flow.events import Event, event_function
 from lie_codegen.flow.events import Function as EventFunction
 from lie_codegen.flow.inputs import Signal
 from lie_codegen.flow.magnus.run import MOST_STEPS, ORDERS, SINGLE_GOAL
-from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup
 
+#: The methods of fourth order of `lc.simulate`.
+FOURTH_ORDER = ("rkmk4", "commutator_free")
 _DEFAULT, _SMALLEST = 1e-11, 1e-14
 
 
@@ -170,5 +171,7 @@ def initial_elements(group: MatrixGroup, X0: ArrayLike | None) -> Array:
         )
     if not np.all(np.isfinite(start)):
         raise NotFiniteError(f"simulate({group.name}): X0 holds NaN or infinity")
+    from lie_codegen.groups.maps.admission import admitted, admitted_all
+
     where = f"simulate({group.name}): X0"
     return admitted(group, start, where).X if start.ndim == 2 else admitted_all(group, start, where)[0]

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.flow.chart import Samples, follow_chart
 from lie_codegen.flow.events import EventHits
-from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.inputs import drive_signal
-from lie_codegen.flow.libraries import step_of
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.norms import norms_of
 from lie_codegen.flow.magnus.run import MOST_STEPS, flow, magnus_run
 from lie_codegen.flow.magnus.steps import plan_steps
-from lie_codegen.flow.refined import refined
-from lie_codegen.flow.restarts import Chart, restarted_charts
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.light_dataclass import dataclass
+
+if TYPE_CHECKING:
+    from lie_codegen.flow.chart import Samples
+    from lie_codegen.flow.grid import Grid
+    from lie_codegen.flow.restarts import Chart
 
 _WHOLE = np.array([0.0, 0.5, 1.0])
 
@@ -114,16 +116,23 @@ class Trajectory(Saved):
     @cached_property
     def g(self) -> Array:
         """(k, n) Wei-Norman coordinates; see the class."""
+        from lie_codegen.flow.chart import follow_chart
+
         return follow_chart(self.group, self._grid, self._samples, self.X)
 
     @cached_property
     def charts(self) -> tuple[Chart, ...]:
         """Wei-Norman charts that cover the trajectory, each restarted before the last one ends."""
+        from lie_codegen.flow.restarts import restarted_charts
+
         return restarted_charts(self.group, self._grid, self._samples, self.X)
 
     @cached_property
     def _grid(self) -> Grid:
         """Steps at which RKMK4 meets the tolerance; those of the coordinates are as many."""
+        from lie_codegen.flow.libraries import step_of
+        from lie_codegen.flow.refined import refined
+
         if self.X.ndim != 3:
             raise InputError(f"{self.group.name}: coordinates are of one trajectory; simulate it alone")
         signal = drive_signal(self.drive, self.t)

@@ -14,10 +14,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.degraded import warn_degraded
 from lie_codegen.runtime.digests import digest
 

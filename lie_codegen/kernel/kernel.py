@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import random
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.plain_data import Definition, made_from
+from lie_codegen.light_dataclass import dataclass
 from lie_codegen.values import settle
+
+if TYPE_CHECKING:
+    import random
 
 #: body(ops, *inputs) -> outputs; vectors are lists, matrices lists of rows, scalars plain scalars.
 Body = Callable[..., tuple[Any, ...]]
 #: sampler(rng) -> one admissible value for each input, in Python floats (or Complex for complex ports).
-Sampler = Callable[[random.Random], tuple[Any, ...]]
+Sampler: TypeAlias = "Callable[[random.Random], tuple[Any, ...]]"
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,16 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import stat
 import weakref
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import CacheWarning
+from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.compiler import compile_seconds
 from lie_codegen.whole_files import private_file
 
@@ -223,6 +222,8 @@ def _file_digest(path: Path) -> str:
 
 def remove_scratch(home: Path) -> None:
     """Remove a folder of `scratch`, whatever a compiler left in it."""
+    import shutil  # loads three compressors
+
     shutil.rmtree(home, ignore_errors=True)
 
 

@@ -8,16 +8,15 @@ breakpoints.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError
+from lie_codegen.light_dataclass import dataclass
 from lie_codegen.signals.trig_signal import Brackets
 from lie_codegen.values import Value
 
@@ -32,10 +31,10 @@ _MOST_PANELS = 4096
 def _rules() -> tuple[Array, Array, Array, Array]:
     """Nodes on [-1, 1], values -> Chebyshev coefficients, values -> primitive at the nodes, weights of the integral."""
     nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)[::-1]
-    analyse = np.linalg.inv(chebyshev.chebvander(nodes, NODES - 1))
-    integrate = np.stack([chebyshev.chebint(row, lbnd=-1) for row in analyse.T], axis=-1)
-    primitive = chebyshev.chebvander(nodes, NODES) @ integrate
-    weights = chebyshev.chebvander(np.ones(1), NODES)[0] @ integrate
+    analyse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, NODES - 1))
+    integrate = np.stack([np.polynomial.chebyshev.chebint(row, lbnd=-1) for row in analyse.T], axis=-1)
+    primitive = np.polynomial.chebyshev.chebvander(nodes, NODES) @ integrate
+    weights = np.polynomial.chebyshev.chebvander(np.ones(1), NODES)[0] @ integrate
     return nodes, np.asarray(analyse, dtype=float), primitive, weights
 
 
@@ -77,7 +76,7 @@ class Panels:
         left, right = self.edges[panel], self.edges[panel + 1]
         x = (2 * flat - left - right) / (right - left)
         coefficients = np.einsum("km,pmn->pkn", _rules()[1], values)[panel]
-        basis = chebyshev.chebvander(x, NODES - 1)
+        basis = np.polynomial.chebyshev.chebvander(x, NODES - 1)
         return np.asarray(np.einsum("tk,tkn->tn", basis, coefficients)).reshape(*np.shape(t), values.shape[2])
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,11 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.norms import size_of
 from lie_codegen.kernel.saved import Saved
+from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.formula_input import FormulaInput
-from lie_codegen.signals.resolved_input import ResolvedInput
+
+if TYPE_CHECKING:
+    from lie_codegen.signals.resolved_input import ResolvedInput
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive
+from lie_codegen.light_dataclass import dataclass
 
 Counts = NDArray[np.intp]
 
