@@ -20,6 +20,8 @@ from lie_codegen.steering.shooting.extremal import Extremal
 
 _ITERATIONS = 25
 _HALVINGS = 8
+#: Most that a step changes a costate, in units of 1 + its size.
+_LEAP = 100.0
 #: Misses that are rounding; what Newton's steps come to on well-posed problems is below 1e-13.
 _THERE = 1e-11
 
@@ -67,6 +69,10 @@ def met(flown: Callable[[Array], Extremal], mu0: Array, target: Array, free: Arr
         miss, across = _equations(extremal, at.target, free)
         # least squares: where a motion of the set costs nothing (spheres of equal points) the matrix is singular along it
         step = np.linalg.lstsq(np.vstack([top, bottom]), -np.concatenate([miss, across]), rcond=1e-10)[0]
+        # a matrix that is singular but for rounding asks for costates of 1e9, whose extremals turn as often
+        step = step * min(
+            1.0, _LEAP * (1 + np.linalg.norm(extremal.mu0)) / max(float(np.linalg.norm(step[:n])), 1e-300)
+        )
         for halving in range(_HALVINGS):
             part = step * 0.5**halving
             moved = at.target @ expm(extremal.group.hat(part[n:] @ free))
