@@ -88,7 +88,8 @@ def _tokens(text: str, pattern: re.Pattern[str]) -> list[Token]:
         match = pattern.match(text, position)
         if match is None:
             column = position + len(text[position:]) - len(text[position:].lstrip())
-            raise ExpressionError(f"column {column + 1}: {text[column]!r} is not understood in {text!r}")
+            numpy = "; NumPy prints a number so by repr: write float(x)" if "np.float64(" in text else ""
+            raise ExpressionError(f"column {column + 1}: {text[column]!r} is not understood in {text!r}{numpy}")
         kind = str(match.lastgroup)
         tokens.append(Token(kind, match.group(kind), match.start(kind) + 1))
         position = match.end()

@@ -182,3 +182,8 @@ def test_formulas_of_matrices_have_the_grammar_of_numbers() -> None:
     assert scalar_formula("2^3^2 + 2**-1", known, {}, {}) == 512 + sp.Rational(1, 2)
     assert scalar_formula("tr((X)^-1*(2*X)')", known, {}, {}) == (INVERSE * 2 * ELEMENT.T).trace()
     assert scalar_formula("(tr(X)^(1+1) - tr(X^2))/2", known, {}, {}).expand() == ELEMENT.det().expand()
+
+
+def test_a_number_as_numpy_prints_it_is_refused_with_the_remedy() -> None:
+    with pytest.raises(ExpressionError, match=r"column 3: '\.' is not understood .* write float\(x\)"):
+        parse_number("np.float64(0.25)")
