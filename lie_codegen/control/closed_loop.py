@@ -132,7 +132,7 @@ def closed_loop(
         t: (k,) equally spaced times.
         rtol: on the entries of the state at the times t, absolute; 1e-10 if neither it nor `step` is given. A law that acts
             continuously on a group goes by the pair 8(5,3), whose local errors are made smaller until two runs agree; of many
-            loops the local tolerance is found by sixteen, and each block of 64 holds it. Otherwise steps are halved until two
+            loops the local tolerance is found by 16 to 128 of them, and each holds it. Otherwise steps are halved until two
             runs agree; of more than 64 sampled loops 64 are watched.
         step: integration step [s].
         sample: [s] from one call of the law to the next; the times t must fall on calls.

@@ -26,8 +26,9 @@ from lie_codegen.runtime.threads import share_out
 _STEPS, _FIRST_STEPS = 4096, 256
 #: Members below which a thread costs more than it does.
 _BLOCK = 64
-#: Members of the pilot, and how many times more than the worst of them others may err: with steps of their own one of 10,000 erred 16 times as much.
-_PILOT, _MARGIN = 16, 16.0
+#: Members of the pilot, at least and at most, of how many it is one, and how many times more than the worst of them others may err: of 10,000 with
+#: steps of their own some err up to ten times as much as the worst of 128, whose steps happened to look better than they were.
+_PILOT, _LARGEST_PILOT, _PART, _MARGIN = 16, 128, 32, 16.0
 #: The run that is given has local errors so much smaller than the one it is compared with.
 _RATIO = 16.0
 #: By so much its steps are shorter.
@@ -95,7 +96,7 @@ def integrate(
     """States of N members at the times, the first of which is that of (X0, y0): errors below rtol max(1, |state|) or atol.
 
     One member is run at two tolerances, and again at smaller ones until they agree; of many the tolerance is found by
-    a pilot of sixteen, then each holds its own local errors below it.
+    a pilot of 16 to 128, then each holds its own local errors below it.
 
     Args:
         system: what is integrated.
@@ -110,7 +111,8 @@ def integrate(
     """
     if len(X0) == 1:
         return _to_tolerance(system, X0, y0, times, rtol, atol, where)[0]
-    chosen = np.unique(np.linspace(0, len(X0) - 1, min(_PILOT, len(X0))).astype(int))
+    some = min(max(_PILOT, len(X0) // _PART), _LARGEST_PILOT, len(X0))
+    chosen = np.linspace(0, len(X0) - 1, some).astype(int)
     pilot, local = _to_tolerance(system.of_members(chosen), X0[chosen], y0[chosen], times, rtol, atol, where)
 
     return replace(_many(system, X0, y0, times, *local, where, threads), error_estimate=pilot.error_estimate)

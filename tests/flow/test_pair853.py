@@ -183,6 +183,23 @@ def test_members_have_inertias_gains_and_states_of_their_own(threads: int) -> No
         assert np.max(np.abs(run.y[:, m, 3:] - w)) < 2e-9
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+def test_the_worst_of_thousands_is_within_the_tolerance(rtol: float) -> None:
+    rng, N = np.random.default_rng(8), 3000
+    J = np.array([np.diag(row) for row in rng.uniform(0.5, 4, (N, 3))])
+    k, xi, times = rng.uniform(1, 8, N), rng.normal(size=(N, 3)), np.linspace(0, 6, 5)
+    system = with_numbers(free_body("so3", damping=True), J, k)
+    run, exact = (
+        integrate(system, *start("so3", xi), times, rtol=each, atol=0.0, where="test") for each in (rtol, 1e-13)
+    )
+    off = np.maximum(np.abs(run.X - exact.X).max(axis=(0, 2)), np.abs(run.y - exact.y).max(axis=(0, 2)))
+    worst = int(np.argmax(off))
+    X, w = reference("so3", J[worst], xi[worst], times, float(k[worst]))
+    assert np.max(np.abs(matrices("so3", exact.X[:, worst]) - X)) < 2e-12
+    assert off[worst] <= rtol * max(1.0, float(np.abs(w).max()))
+    assert off[worst] <= run.error_estimate
+
+
 def test_a_free_body_over_a_long_time_keeps_its_energy_to_the_tolerance() -> None:
     J, xi = np.diag([1.0, 2.0, 3.0]), np.array([0.3, 1.0, 0.2])
     run = integrate(
