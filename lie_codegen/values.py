@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import Field, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lie_codegen.door import guard_methods
-from lie_codegen.light_dataclass import dataclass
 
 #: Lines and characters of a printed value.
 _LINES, _WIDTH = 10, 110

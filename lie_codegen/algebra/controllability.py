@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import accumulate
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.algebra.lyndon import BracketWord, Word, bracket_word, lyndon_words, standard_factorization
 from lie_codegen.errors import InputError, UncontrollableError
 from lie_codegen.exact.numbers import Number, domain_matrix
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import Value
 

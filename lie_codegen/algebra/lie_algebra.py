@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,6 @@ import numpy as np
 from lie_codegen.errors import AlgebraError, InputError, JacobiError
 from lie_codegen.exact.numbers import Number, exact_number, field_elements
 from lie_codegen.identifiers import check_identifier
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import brief
 

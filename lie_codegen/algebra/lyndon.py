@@ -8,8 +8,7 @@ Lyndon, Ann. Math. 68 (1958) 81), so their images span every layer of a Lie alge
 from __future__ import annotations
 
 from collections.abc import Iterator
-
-from lie_codegen.light_dataclass import dataclass
+from dataclasses import dataclass
 
 Word = tuple[int, ...]
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from lie_codegen.kernel.kernel import Kernel
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

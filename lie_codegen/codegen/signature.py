@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

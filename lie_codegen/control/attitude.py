@@ -18,6 +18,7 @@ from there. The way it takes is the short one: it depends on R alone, so there i
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
@@ -27,7 +28,6 @@ from numpy.typing import ArrayLike
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.exact.positive_matrix import as_floats, eigenvalues, positive_matrix, positive_number
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.shapes import shaped
 
 #: c' of the torque's gyroscopic term, by name.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from lie_codegen.kernel.definition import kernel_factory, record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 #: How far |r| may be from 1 for a reference on a sphere.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lie_codegen.groups.maps.guard import nan_off_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.kernel import Body, Kernel
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)

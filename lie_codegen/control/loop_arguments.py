@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -25,7 +25,6 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
 from lie_codegen.kernel.definition import plain
 from lie_codegen.kernel.kernel import Kernel
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

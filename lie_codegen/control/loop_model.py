@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,6 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.kernel import Kernel, Port, uniform_sample
 from lie_codegen.kernel.linear import Vector, plus, scaled
-from lie_codegen.light_dataclass import dataclass
 
 #: What noise may be put on, in the order in which its numbers are drawn.
 NOISE = ("X", "xi", "u", "y")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from lie_codegen.flow.pair853 import PairRun
 from lie_codegen.kernel.plain_data import Definition, made_from
 from lie_codegen.kernel.records import check_kinds
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.sampled_loop import NoiseStream
 
 

@@ -17,6 +17,7 @@ The first output is the command: a body velocity in a loop of order 1, a body fo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -33,7 +34,6 @@ from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec, number
 from lie_codegen.kernel.plain_data import Definition, made_from
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 CONFIGURATION, VELOCITY = ("X", "q"), ("xi", "omega", "q_dot")

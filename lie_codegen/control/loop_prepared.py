@@ -7,6 +7,7 @@ enough for. What may differ another time though it looks the same, a Python func
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -21,7 +22,6 @@ from lie_codegen.door import warnings_given
 from lie_codegen.flow.pair_system import System
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.kernel import Kernel
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.library import Library
 from lie_codegen.values import Value
 

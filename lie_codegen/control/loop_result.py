@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,6 @@ from lie_codegen.control.loop_origin import LoopMaking, LoopOrigin
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import EventHits
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.values import Deferred, settle
 
 

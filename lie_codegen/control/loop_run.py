@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.loop_model import NOISE, Loop
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.pair_system import System
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.call import Compiled
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.rows import row_by_row

@@ -11,6 +11,7 @@ M + J^T J stands for it: it agrees with M on TQ, and the connection depends on n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -30,7 +31,6 @@ from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.linear import Matrix, Vector, dot, matvec, minus, plus, scaled
 from lie_codegen.kernel.parameter import refuse_input
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 #: Places at which a manifold and what lives on it are tried.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +16,6 @@ from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import Vector, plus
-from lie_codegen.light_dataclass import dataclass
 
 #: How far X0 may be from the manifold, as elements of a group from theirs.
 _NEAR = 1e-5

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -34,7 +35,6 @@ from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import Matrix, Vector, constant_matrix, dot
 from lie_codegen.kernel.parameter import INPUT, Parameter, parameter
 from lie_codegen.kernel.plain_data import NoDefinitionError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.mechanics.kernels import acceleration
 from lie_codegen.mechanics.states import initial_states, split_states
 from lie_codegen.runtime.records import find_record, store_record

@@ -9,6 +9,7 @@ All are twice continuously differentiable, as Theorem 4.2 asks (Bullo and Murray
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
@@ -22,7 +23,6 @@ from lie_codegen.exact.numbers import exact_number
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.definition import doubles, record_factory
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.records import find_record, source_of, store_record
 from lie_codegen.values import Deferred, Later

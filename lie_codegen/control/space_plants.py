@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 from typing import Any
@@ -29,7 +30,6 @@ from lie_codegen.kernel.definition import record_factory
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Vector, dot, minus, plus, scaled
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.mechanics.lagrangian import LagrangianSystem
 from lie_codegen.on_demand import sympy as sp
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from contextvars import ContextVar, Token
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from types import TracebackType
 
 from lie_codegen.errors import InputError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 

@@ -15,13 +15,13 @@ SymPy's parser.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeAlias
 
 from lie_codegen.errors import ExpressionError
 from lie_codegen.exact.budget import current_budget, digits, over
 from lie_codegen.exact.token_stream import Token, TokenStream
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 _MAX_EXPONENT = 64

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from lie_codegen.errors import ExpressionError
 from lie_codegen.exact.budget import complaint, current_budget, over
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 _MAX_LENGTH = 4000

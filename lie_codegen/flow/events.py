@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.chandrupatla import roots
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 
 #: Where g is looked at within a step, beside its ends: at no rational part of it.
 INNER = np.array([0.3090169943749474, 0.7071067811865476])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
@@ -12,7 +13,6 @@ from lie_codegen.exact.budget import current_budget
 from lie_codegen.exact.expression import FORMULA_FUNCTIONS, parse_expression, time_symbol
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.formula_program import FormulaProgram, formula_program
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.runtime.records import recalled

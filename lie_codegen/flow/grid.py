@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.inputs import Signal
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.drive_arguments import Spans
 
 

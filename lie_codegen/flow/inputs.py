@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 
 #: How far a value that is asked for alone may lie from the same among others, relative to the largest.

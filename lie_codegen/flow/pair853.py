@@ -7,7 +7,7 @@ what they add up to is judged by a second run at another tolerance, so that the 
 from __future__ import annotations
 
 import ctypes
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from math import nan, sqrt
 
@@ -19,7 +19,6 @@ from lie_codegen.errors import ComputationError
 from lie_codegen.flow.pair_lanes import run_lanes
 from lie_codegen.flow.pair_library import DONE, FULL, MANY, compiled_pair, refuse
 from lie_codegen.flow.pair_system import System
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.threads import share_out
 
 #: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots, at first for fewer.

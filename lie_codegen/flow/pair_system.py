@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +13,6 @@ import numpy as np
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.flow.pair_library import STAGES, Pair, compiled_pair, pair_library
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.call import Compiled
 
 

@@ -6,6 +6,8 @@ at g = 0, or where |M(g)| has grown tenfold (finite escape, or plainly a long wa
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from lie_codegen.arrays import Array
@@ -15,7 +17,6 @@ from lie_codegen.flow.grid import Grid
 from lie_codegen.flow.libraries import integrators
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.rows import row_by_row
 
 _SMALLEST_DETERMINANT = 0.25

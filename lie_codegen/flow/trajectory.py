@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,6 @@ from lie_codegen.flow.magnus.run import MOST_STEPS, flow, magnus_run
 from lie_codegen.flow.magnus.steps import plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 
 if TYPE_CHECKING:
     from lie_codegen.flow.chart import Samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,6 @@ from lie_codegen.kernel.casadi_functions import CasadiFunctions
 from lie_codegen.kernel.definition import definition_of
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.plain_data import Definition
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.values import brief
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 from lie_codegen.algebra.constructions import _coordinate_map
 from lie_codegen.exact.numbers import Number
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 

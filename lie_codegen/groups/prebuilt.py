@@ -14,11 +14,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.degraded import warn_degraded
 from lie_codegen.runtime.digests import digest
 

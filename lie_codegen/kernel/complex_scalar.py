@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
-
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

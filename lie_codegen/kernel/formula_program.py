@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,6 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
-from lie_codegen.light_dataclass import dataclass
 
 #: What the arithmetics have by that name, beside + - * / and the sign.
 _FUNCTIONS = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -13,7 +13,6 @@ from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.plain_data import Definition, made_from
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.values import settle
 
 if TYPE_CHECKING:

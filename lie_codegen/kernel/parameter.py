@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import constant_matrix, number
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 #: What a caller writes in place of a number that is to be an input.

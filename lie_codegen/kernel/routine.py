@@ -12,7 +12,7 @@ always, and their derivative would be that of the sweeps. A routine is plain C w
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from lie_codegen.arrays import Array
@@ -20,7 +20,6 @@ from lie_codegen.errors import CodegenError
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.kernel import Kernel
-from lie_codegen.light_dataclass import dataclass
 
 #: tangent(ops, inputs, outputs, input rates) -> output rates.
 Tangent = Callable[[Arithmetic, Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]], list[Scalar]]

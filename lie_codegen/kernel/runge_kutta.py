@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import groupby
@@ -16,7 +17,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.kernel.arithmetic import Arithmetic
 from lie_codegen.kernel.linear import plus, scaled
 from lie_codegen.kernel.structural_zeros import product
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ y = (q, v),  y' = X(y) + Y_a(q) u^a,  Y_a = (0, M^{-1} B e_a).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +16,6 @@ from lie_codegen.errors import InputError
 from lie_codegen.exact.budget import Meter, expanded_terms
 from lie_codegen.identifiers import check_identifier
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.mechanics.formulas import formula, names_in, parameter_values
 from lie_codegen.mechanics.vector_fields import Field, tidy
 from lie_codegen.on_demand import sympy as sp

@@ -20,13 +20,13 @@ import re
 import stat
 import weakref
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lie_codegen.codegen.signature import Signature
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import CacheWarning
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.compiler import compile_seconds
 from lie_codegen.whole_files import private_file
 

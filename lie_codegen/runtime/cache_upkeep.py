@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.cache import DIGEST, in_use, read_json, remove_scratch, unlink
 from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 from lie_codegen.runtime.compiler import find_compilers

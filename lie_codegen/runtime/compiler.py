@@ -12,6 +12,7 @@ import errno
 import os
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -19,7 +20,6 @@ from typing import Any
 
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import CompileError, CompilerStoppedError, CompilerWarning, NoCompilerWarning
-from lie_codegen.light_dataclass import dataclass
 
 #: -ffp-contract=off: the same numbers as the interpreter; never -ffast-math, which changes the whole process.
 #: No automatic vectorising: gcc 12.2 fuses multiply and add in it in spite of -ffp-contract=off (measured).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,7 +13,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.signature import Signature, is_step
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.kernel.kernel import Port
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import Backend
 from lie_codegen.runtime.formula_input import FormulaInput

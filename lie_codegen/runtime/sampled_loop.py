@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.arguments_scan import loops
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.philox import uniforms

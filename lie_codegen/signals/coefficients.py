@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
 
 from lie_codegen.errors import InputError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 
 #: An int, or a PolyElement over the integers.

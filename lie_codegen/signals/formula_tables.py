@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import FormulaInput, fourier_input, lines_input
 from lie_codegen.signals.piecewise_waveform import PiecewiseWaveform

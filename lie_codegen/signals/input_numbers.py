@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.exact.budget import current_budget
 from lie_codegen.kernel.formula_program import FormulaProgram
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.formula_input import FormulaInput
 from lie_codegen.runtime.records import recalled
 from lie_codegen.signals.formula_tables import PieceTable, piece_table, series_formula

@@ -8,10 +8,10 @@ the lengths: they are in the ring of coefficients.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import Coefficient, CoefficientRing

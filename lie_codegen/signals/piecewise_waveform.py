@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
 from lie_codegen.errors import InputError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.piecewise_signal import Pieces, PiecewiseCalculus, ring_values

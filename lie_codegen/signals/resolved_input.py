@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.values import Value
 
 TERMS = 9

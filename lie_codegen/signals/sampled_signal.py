@@ -8,6 +8,7 @@ breakpoints.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, NotFiniteError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.signals.trig_signal import Brackets
 from lie_codegen.values import Value
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from lie_codegen.errors import PeriodError
 from lie_codegen.exact.budget import Meter
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import CoefficientRing

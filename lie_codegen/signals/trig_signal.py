@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 from lie_codegen.algebra.lie_algebra import Sparse
 from lie_codegen.exact.budget import Meter
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.signals import trigonometric as trig
 from lie_codegen.signals.coefficients import Coefficient, CoefficientRing
 

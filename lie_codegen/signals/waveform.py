@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -10,7 +11,6 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.signals.coefficients import CoefficientRing
 from lie_codegen.signals.sampled_signal import Panels, SampledCalculus

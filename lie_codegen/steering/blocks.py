@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.errors import SteeringInputError
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.steering.obstacles.solids import Solids
 from lie_codegen.values import settle
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.steering.blocks import Box, Cylinder
 from lie_codegen.steering.obstacles.solids import Solids
 

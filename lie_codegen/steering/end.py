@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ goal does not care about. A plain element T is the goal X = T.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from lie_codegen.errors import NotFiniteError, ShapeError, SteeringInputError
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.steering.end import End, element_end, has_positions
 from lie_codegen.steering.gates import gate_end
 from lie_codegen.values import settle

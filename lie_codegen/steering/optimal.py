@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.flow.logarithm import distance
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.steering.plan import Controls, Facts, Plan, Status, Stretched
 from lie_codegen.steering.shooting.extremal import Extremal
 from lie_codegen.steering.shooting.shooter import shooter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from importlib import import_module
@@ -19,7 +19,6 @@ from lie_codegen.codegen.parts import PackageParts
 from lie_codegen.errors import InputError, NotFiniteError
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved, json_value, table_text
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.values import Value, settle
 from lie_codegen.whole_files import write_whole
 

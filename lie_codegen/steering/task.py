@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -17,7 +17,6 @@ from lie_codegen.flow.batched_exponential import expm
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.identifiers import shown
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.records import recalled
 from lie_codegen.steering.accessibility import with_drift
 

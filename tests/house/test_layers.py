@@ -16,7 +16,7 @@ import lie_codegen
 
 #: From the ground up; imports point down (or stay on their floor), lazy ones and those for type checkers included.
 LAYERS = (
-    "errors", "light_dataclass", "stubs", "whole_files", "identifiers", "unbound", "lost_parts", "door", "on_demand", "arrays", "shapes", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
+    "errors", "stubs", "whole_files", "identifiers", "unbound", "lost_parts", "door", "on_demand", "arrays", "shapes", "values", "exact", "algebra", "kernel", "codegen", "runtime", "groups", "signals", "flow", "mechanics",
     "control", "vehicles", "averaging", "rigid_body", "steering", "pictures", "studies", "gallery", "benchmarks", "cli",
 )  # fmt: skip
 PACKAGE = Path(lie_codegen.__file__).parent

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -14,7 +15,6 @@ from lie_codegen.flow.magnus.norms import norms_of
 from lie_codegen.flow.magnus.solver import LONG, REACHED, TOO_MANY, TOO_MANY_AT_FIRST, Solved, Solver
 from lie_codegen.flow.magnus.steps import Steps, plan_steps
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.threads import share_out
 
 #: method -> order.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive
 from lie_codegen.flow.magnus.library import Input, MagnusLibrary, Solve, read_by
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 
 REACHED, TOO_MANY_AT_FIRST, TOO_MANY, NOT_FINITE, LONG = range(5)
 _TASKS_KEPT, _MOST_TIMES_KEPT = 4, 4096

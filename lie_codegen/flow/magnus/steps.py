@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.drive import Drive
-from lie_codegen.light_dataclass import dataclass
 
 Counts = NDArray[np.intp]
 

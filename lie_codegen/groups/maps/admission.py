@@ -10,6 +10,7 @@ With kappa = max(1, |X| |X^-1|), the sizes of the largest entries, and `defect` 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
 from lie_codegen.groups.build import build
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.rows import row_by_row
 
 if TYPE_CHECKING:

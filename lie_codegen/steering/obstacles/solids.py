@@ -10,12 +10,11 @@ is the distance to the surface of the rounded solid, and changes by no more than
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.light_dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)

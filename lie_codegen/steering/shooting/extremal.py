@@ -6,7 +6,7 @@ u_i = <mu, A_i> / w_i, mu' = ad*_u mu, unit time. Along X' = X hat(u) the moment
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,6 @@ from lie_codegen.arrays import Array
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.runge_kutta import propagators
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.steering.shooting.bracket_lengths import bracket_lengths
 
 _ORDER = 12

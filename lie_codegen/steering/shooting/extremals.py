@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from lie_codegen.arrays import Array
 from lie_codegen.kernel.saved import Saved
-from lie_codegen.light_dataclass import dataclass
 
 #: Values of `Extremals.status`, as in the generated header.
 NOTHING_FOUND, SOLVED, NOT_CONVERGED = 0, 1, 2

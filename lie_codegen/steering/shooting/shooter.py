@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -23,7 +24,6 @@ from lie_codegen.door import on_behalf
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import CALLS, in_parts, interruptible

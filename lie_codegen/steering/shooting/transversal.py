@@ -9,13 +9,12 @@ mu(0), n numbers, and the place on the set, k numbers; with xi = vee(X^-1 dX/d m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.flow.batched_exponential import expm
-from lie_codegen.light_dataclass import dataclass
 from lie_codegen.steering.shooting.extremal import Extremal
 
 _ITERATIONS = 25
