@@ -27,11 +27,17 @@ def linearise(programme: Programme, goal: Goal, u: Array) -> tuple[Array, Array,
 
 def factors(programme: Programme, u: Array) -> tuple[Array, Array]:
     """The exponentials E (L, K, d, d) at controls u (L, S, m), and their derivatives (L, K, m, d, d) by what drives each."""
+    return exponentials(*_exponents(programme, u))
+
+
+def _exponents(programme: Programme, u: Array) -> tuple[Array, Array]:
+    """What the exponentials are of, (L, K, d, d), and the directions (L, K, m, d, d) in which controls move it."""
     p = programme
     entry = np.broadcast_to(p.entry, (len(u), p.entry.shape[1]))
     b = p.directions[entry]
     driven = p.share[:, :1] * u[:, p.slot] + p.share[:, 1:] * u[:, np.minimum(p.slot + 1, u.shape[1] - 1)]
-    return exponentials(p.drifts[entry] + np.einsum("lki,lkixy->lkxy", driven, b), b)
+    moved = driven[:, :, None] @ b.reshape(*driven.shape, -1)
+    return p.drifts[entry] + moved.reshape(b[:, :, 0].shape), b
 
 
 def by_factors(programme: Programme, goal: Goal, E: Array, dE: Array) -> tuple[Array, Array, Array]:
@@ -50,8 +56,10 @@ def by_factors(programme: Programme, goal: Goal, E: Array, dE: Array) -> tuple[A
     moved = (goal.left @ before)[:, :, None] @ dE @ (after @ goal.right)[:, :, None]
     r, reduce = residual(programme.basis, goal, X)
     moved = _following(goal, goal.left @ X @ goal.right, moved)[1]
-    rows = np.einsum("lnq,lkiq->lnki", reduce, flat(moved))
-    return r, np.einsum("lnq,lq->ln", reduce, r), rows
+    slopes = flat(moved)
+    rows = slopes.reshape(len(slopes), -1, slopes.shape[-1]) @ np.swapaxes(reduce, 1, 2)
+    rows = np.moveaxis(rows.reshape(*slopes.shape[:3], -1), 3, 1)
+    return r, (reduce @ r[..., None])[..., 0], rows
 
 
 def residual(basis: Array, goal: Goal, X: Array) -> tuple[Array, Array]:
@@ -91,7 +99,30 @@ def flat(matrices: Array) -> Array:
 
 
 def exponentials(a: Array, b: Array) -> tuple[Array, Array]:
-    """exp(a) (..., d, d) and its derivatives (..., m, d, d) along b: Taylor's polynomial by Horner's rule, then squarings."""
+    """exp(a) (..., d, d) and its derivatives (..., m, d, d) along b: by eigenvectors where a is skew-Hermitian, else by a series."""
+    if np.array_equal(a, -np.conj(np.swapaxes(a, -1, -2))):
+        return _unitary(a, b)
+    return _by_series(a, b)
+
+
+def _unitary(a: Array, b: Array) -> tuple[Array, Array]:
+    """With a = V diag(i w) V^H: exp(a) = V diag(e^(i w)) V^H, and along b the entries of V^H b V by the divided differences of exp
+    (Daleckii and Krein), e^(i (w_j + w_k) / 2) sinc((w_j - w_k) / 2), which equal w leave alone."""
+    w, V = np.linalg.eigh(-1j * a)
+    back = np.conj(np.swapaxes(V, -1, -2))
+    E = (V * np.exp(1j * w)[..., None, :]) @ back
+    turn = np.exp(0.5j * w)
+    apart = np.sinc((w[..., :, None] - w[..., None, :]) / (2 * np.pi))
+    differences = turn[..., :, None] * turn[..., None, :] * apart
+    inner = back[..., None, :, :] @ b @ V[..., None, :, :]
+    dE = V[..., None, :, :] @ (differences[..., None, :, :] * inner) @ back[..., None, :, :]
+    if np.iscomplexobj(a) or np.iscomplexobj(b):
+        return E, dE
+    return E.real.copy(), dE.real.copy()
+
+
+def _by_series(a: Array, b: Array) -> tuple[Array, Array]:
+    """Taylor's polynomial by Horner's rule, then squarings."""
     size = float(np.max(np.sum(np.abs(a), axis=-2), initial=0.0))
     halvings = max(0, math.ceil(math.log2(size / 1.5))) if size > 1.5 else 0
     a, b = a / 2**halvings, b / 2**halvings
@@ -129,12 +160,8 @@ def phase_ahead(programme: Programme, goal: Goal, u: Array) -> Array:
 
 def end(programme: Programme, u: Array) -> Array:
     """X (L, d, d) at the end of the chain."""
-    lanes, slots, _ = u.shape
-    p = programme
-    entry = np.broadcast_to(p.entry, (lanes, p.entry.shape[1]))
-    driven = p.share[:, :1] * u[:, p.slot] + p.share[:, 1:] * u[:, np.minimum(p.slot + 1, slots - 1)]
-    E = expm(p.drifts[entry] + np.einsum("lki,lkixy->lkxy", driven, p.directions[entry]))
-    X = np.broadcast_to(p.start, E[:, 0].shape)
+    E = expm(_exponents(programme, u)[0])
+    X = np.broadcast_to(programme.start, E[:, 0].shape)
     for k in range(E.shape[1]):
         X = X @ E[:, k]
     return np.asarray(X)
