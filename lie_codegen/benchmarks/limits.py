@@ -22,16 +22,22 @@ class Limits:
     operations: float
 
 
+#: What processors call the widest vectors they compute with, the widest first, and how they are known to people.
+_VECTORS = {"avx512f": "AVX-512", "avx2": "AVX2", "asimd": "NEON", "sse2": "SSE2"}
+
+
 def machine() -> str:
-    """The class of the processor, and how busy it is."""
-    name = platform.processor() or platform.machine()
+    """The class of the processor, its vectors, and how busy it is."""
+    name, flags = platform.processor() or platform.machine(), ""
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            name = next((line.split(":")[1].strip() for line in file if line.startswith("model name")), name)
+            told = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in file)}
+        name, flags = told.get("model name", name), told.get("flags", told.get("Features", ""))
     except OSError:
         pass
+    vectors = next((f", {word}" for flag, word in _VECTORS.items() if flag in flags.split()), "")
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return f"{name}, {os.cpu_count()} cores{load}, Python {platform.python_version()}, numpy {np.__version__}"
+    return f"{name}{vectors}, {os.cpu_count()} cores{load}, Python {platform.python_version()}, numpy {np.__version__}"
 
 
 def limits(hand: ctypes.CDLL) -> Limits:
