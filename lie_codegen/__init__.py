@@ -4,9 +4,9 @@ The names of the front door stand in __init__.pyi, by subject; each is imported 
 compiled functions imports neither SymPy nor CasADi.
 """
 
-from lie_codegen.stubs import attach_stub
+import lazy_loader
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ += ["__version__"]

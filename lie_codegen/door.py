@@ -19,9 +19,10 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TypeAlias, TypeVar
 
+import lazy_loader
+
 from lie_codegen.errors import ArgumentError, LieCodegenError, SubinterpreterError, SystemRefusalError
 from lie_codegen.lost_parts import loses_parts, would_lose_parts
-from lie_codegen.stubs import attach_stub
 from lie_codegen.unbound import unbound
 
 #: Packages whose frames belong to the work of a call: whatever else raises is the user's own.
@@ -51,7 +52,7 @@ Class = TypeVar("Class", bound=type)
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """(__getattr__, __dir__, __all__) of a subject with a stub beside it."""
-    find, listed, names = attach_stub(package, file)
+    find, listed, names = lazy_loader.attach_stub(package, file)
 
     def found(name: str) -> Any:
         if is_subinterpreter():

@@ -14,16 +14,9 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pair_control.h"
 #include "pair_hermite.h"
 #include "pair_step.h"
-
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT
-#endif
-
-enum { MOST_NUMBERS = 32, DONE = 0, FULL = 1, STUCK = 2, LOST = 3 };
 
 typedef void (*Call)(const double *const *in, double *const *out);
 
@@ -137,17 +130,6 @@ static double judged(const Pair *p, const double *y, const double *after, double
     return error <= 1e300 && angle > p->reach * p->reach ? -sqrt(angle) / p->reach : error;
 }
 
-/* A first step: the size of Theta and of what the rates change. */
-static double first_step(const Pair *p, const double *y, const double *k)
-{
-    double fastest = 0.0;
-    for (ptrdiff_t i = 0; i < p->size; ++i) {
-        const double rate = fabs(k[i]) / (fabs(y[i]) + 1.0);
-        fastest = rate > fastest ? rate : fastest;
-    }
-    return fastest > 0.0 ? 0.3 / fastest : INFINITY;
-}
-
 static void keep(Pair *p, const double *X, const double *y)
 {
     memcpy(p->X_out + p->next * p->packed, X, (size_t)p->packed * sizeof(double));
@@ -180,7 +162,7 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
     memset(k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
     rates(p, p->X, p->y, p->t, k);
     if (p->h <= 0.0) {
-        p->h = first_step(p, p->y, k);
+        p->h = first_step(p->size, 1, p->y, k);
     }
     for (ptrdiff_t taken = 0; p->next < p->count; ++taken) {
         const double gap = p->times[p->next] - p->t - p->t_low;
@@ -205,8 +187,8 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
             ++p->rejected;
             /* Theta grows about as h does: the first length ends at 0.9 of its reach */
             const double factor = error < 0.0 ? 0.9 / -error : 0.9 * pow(error, -1.0 / 8);
-            p->h = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN, and where the stages ran away: how far says nothing */
-            if (!(p->h > 1e-15 * fabs(p->t)) || p->h < 1e-300) { /* t + h would be t */
+            p->h = shorter(h, factor);
+            if (vanishes(p->h, p->t)) {
                 return error <= 1e300 ? STUCK : LOST;
             }
             continue;
@@ -229,16 +211,10 @@ EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
             p->t = p->times[p->next];
             p->t_low = 0.0;
             keep(p, p->X, p->y);
-        } else { /* the sum in two doubles */
-            const double sum = p->t + h, rest = (p->t - sum) + h + p->t_low;
-            p->t = sum + rest;
-            p->t_low = rest - (p->t - sum);
+        } else {
+            later(&p->t, &p->t_low, h);
         }
-        {
-            const double factor = error > 0.0 ? 0.9 * pow(error, -1.0 / 8) : 6.0;
-            const double longer = h * (factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor);
-            p->h = h < wish && longer < wish ? wish : longer; /* a step that was cut says nothing against its length */
-        }
+        p->h = next_length(h, wish, error > 0.0 ? 0.9 * pow(error, -1.0 / 8) : 6.0);
         fresh = 1;
     }
     if (p->knot_slope) {

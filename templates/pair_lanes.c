@@ -10,13 +10,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pair_control.h"
 #include "pair_step.h"
-
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT
-#endif
 
 /* gcc makes vectors of a loop in a function of its own; within other loops it unrolls it first. */
 #if defined(__GNUC__)
@@ -25,7 +20,7 @@
 #define APART
 #endif
 
-enum { WIDE = 8, PARTS = WIDE * sizeof(double) / sizeof(PairVector), MOST_NUMBERS = 32, DONE = 0, FULL = 1, STUCK = 2, LOST = 3, MANY = 4 };
+enum { WIDE = 8, PARTS = WIDE * sizeof(double) / sizeof(PairVector) };
 
 typedef void (*Block)(const double *const *in, double *const *out);
 
@@ -148,18 +143,6 @@ static int slope_of(const void *who, double s, const double *y, double *slope)
     return 0;
 }
 
-/* A first step: by the size of Theta and of what the rates change. */
-static double first_step(const Lanes *p, int l)
-{
-    const Room room = room_of(p);
-    double fastest = 0.0;
-    for (ptrdiff_t i = 0; i < p->size; ++i) {
-        const double rate = fabs(room.k[WIDE * i + l]) / (fabs(room.y[WIDE * i + l]) + 1.0);
-        fastest = rate > fastest ? rate : fastest;
-    }
-    return fastest > 0.0 ? 0.3 / fastest : INFINITY;
-}
-
 /* The length of a lane's next step, at most to the next time; whether it ends there. */
 static double cut(const Lanes *p, int l, int *ends)
 {
@@ -228,8 +211,8 @@ static int accepted(Lanes *p, int l, double h, double error, double growth, doub
     /* Theta grows about as h does: the first length ends at 0.9 of its reach */
     const double factor = far ? 0.9 * p->reach / sqrt(angle) : growth;
     ++p->rejected;
-    p->h[l] = h * (factor > 0.2 ? factor : 0.2); /* 0.2 where it is NaN, and where the stages ran away: how far says nothing */
-    if (!(p->h[l] > 1e-15 * fabs(p->t[l])) || p->h[l] < 1e-300) { /* t + h would be t */
+    p->h[l] = shorter(h, factor);
+    if (vanishes(p->h[l], p->t[l])) {
         *why = runs ? STUCK : LOST;
     }
     return 0;
@@ -239,9 +222,8 @@ static int accepted(Lanes *p, int l, double h, double error, double growth, doub
 static void go_on(Lanes *p, int l, double h, double growth, int ends)
 {
     const Room room = room_of(p);
-    const double wish = p->h[l], longer = h * (growth > 6.0 ? 6.0 : growth < 0.2 ? 0.2 : growth);
     ++p->steps;
-    p->h[l] = h < wish && longer < wish ? wish : longer; /* a step that was cut says nothing against its length */
+    p->h[l] = next_length(h, p->h[l], growth);
     if (ends) {
         const ptrdiff_t at = p->next[l] * p->row + p->member[l];
         get(p->X_out + at * p->packed, l, room.X, p->packed);
@@ -249,10 +231,8 @@ static void go_on(Lanes *p, int l, double h, double growth, int ends)
         p->t[l] = p->times[++p->next[l]];
         p->t_low[l] = 0.0;
         p->member[l] = p->next[l] < p->count ? p->member[l] : -1;
-    } else { /* the sum in two doubles */
-        const double sum = p->t[l] + h, rest = (p->t[l] - sum) + h + p->t_low[l];
-        p->t[l] = sum + rest;
-        p->t_low[l] = rest - (p->t[l] - sum);
+    } else {
+        later(p->t + l, p->t_low + l, h);
     }
 }
 
@@ -315,7 +295,7 @@ EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds)
         }
         rates(p, room.y, p->t, room.k);
         for (int l = 0; l < WIDE; ++l) {
-            p->h[l] = p->h[l] > 0.0 ? p->h[l] : first_step(p, l);
+            p->h[l] = p->h[l] > 0.0 ? p->h[l] : first_step(p->size, WIDE, room.y + l, room.k + l);
             h[l] = p->member[l] < 0 ? 0.0 : cut(p, l, ends + l);
         }
         stretch(room.k, p->size, h);

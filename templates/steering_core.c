@@ -9,51 +9,17 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "steering_problem.h"
+
 /*
- * LANES starts lie in one vector of doubles, as many as the processor's registers hold: wider ones cost several times as much. Other
- * compilers have one start a vector. GROUP starts go on together and decide together when to stop, in as many vectors as that takes, so
- * that the answers do not depend on LANES; LIE_CODEGEN_ONE_LANE saves memory by groups of one.
+ * GROUP starts go on together and decide together when to stop, in as many vectors of LANES as that takes, so that the answers do not
+ * depend on LANES; LIE_CODEGEN_ONE_LANE saves memory by groups of one.
  */
-#if defined(LIE_CODEGEN_ONE_LANE) || !defined(__GNUC__)
-#define LANES 1
-#elif defined(LIE_CODEGEN_LANES)
-#define LANES LIE_CODEGEN_LANES
-#elif defined(__AVX512F__)
-#define LANES 8
-#elif defined(__AVX__)
-#define LANES 4
-#else
-#define LANES 2
-#endif
-#if LANES > 1
-#define LANE(v, l) ((v)[l])
-#define LESS(a, b) ((K)((a) < (b)))
-#define SELECT(mask, a, b) ((V)(((mask) & (K)(a)) | (~(mask) & (K)(b))))
-typedef double V __attribute__((vector_size(8 * LANES)));
-typedef int64_t K __attribute__((vector_size(8 * LANES)));
-#else
-#define LANE(v, l) (*(&(v) + (l)))
-#define LESS(a, b) ((a) < (b))
-#define SELECT(mask, a, b) ((mask) ? (a) : (b))
-typedef double V;
-typedef int K;
-#endif
 #if defined(LIE_CODEGEN_ONE_LANE)
 #define GROUP 1
 #else
 #define GROUP 8
 #endif
-
-static void fill(V *v, int count, double value)
-{
-    const V zero = {0.0};
-    int i;
-    for (i = 0; i < count; ++i) {
-        v[i] = zero + value;
-    }
-}
-
-#include "steering_problem.h"
 
 enum {
     PACKS = GROUP / LANES, /* vectors of a group */
@@ -295,7 +261,7 @@ typedef enum {
 static void linearise(const problem *task, int steps, int *exact, slopes kind, point *at)
 {
     V X[SIZE], q[N], G[N * N], Gx[N], graded, zero;
-    K mask;
+    Mask mask;
     int a, b, k, j, any = 0;
     if (kind == PLAIN) {
         tangent(task, steps, at->p, X, at->xi);
@@ -364,9 +330,9 @@ static void linearise(const problem *task, int steps, int *exact, slopes kind, p
     }
 }
 
-static void take(const K *where, point *to, const point *from)
+static void take(const Mask *where, point *to, const point *from)
 {
-    const K mask = *where;
+    const Mask mask = *where;
     int i, j;
     to->F = SELECT(mask, from->F, to->F);
     to->E = SELECT(mask, from->E, to->E);
@@ -547,7 +513,7 @@ static int descend(const problem *task, const rules *rule, const int *own, point
         /* near the end the last Jacobian serves, but not twice */
         kind = bold ? FINE : rule->exact != NULL && kind != KNOWN && open < 1e-10 ? KNOWN : PLAIN;
         for (k = 0; k < PACKS; ++k) {
-            K better;
+            Mask better;
             if (!has_own(own, k)) {
                 continue;
             }

@@ -305,14 +305,9 @@ def _twice(
     given.X_out, given.y_out = X.ctypes.data + 8 * packed, y.ctypes.data + 8 * size
     if compiled_pair().pair_twice(ctypes.addressof(given), start, asked, _FIRST_STEPS, _BETWEEN, first, found) != DONE:
         return None
-    count = given.steps
-    t, h, Xs, ys = (
-        block[places[9 + j] : places[9 + j] + count * width].copy() for j, width in enumerate((1, 1, packed, size))
-    )
     off_X, off_y, largest, coarse = block[places[1] : places[2]].tolist()
-    run = PairRun(
-        X, y, count, given.rejected, given.evaluations, nan, t, h, Xs.reshape(count, packed), ys.reshape(count, size)
-    )
+    knots_kept = _rows(block[places[9] :], rows, given.steps, (1, 1, packed, size))
+    run = PairRun(X, y, given.steps, given.rejected, given.evaluations, nan, *knots_kept)
     return run, max(off_X, off_y), largest, int(coarse)
 
 

@@ -14,7 +14,7 @@ from lie_codegen.errors import CompileError
 from lie_codegen.flow.pair_library import FULL, STAGES, refuse
 from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.backend import load_library
-from lie_codegen.runtime.pair_headers import pair_headers
+from lie_codegen.runtime.pair_headers import group_headers
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import stopped
 
@@ -45,7 +45,7 @@ class Lanes(ctypes.Structure):
 def _library() -> Any:
     def files() -> dict[str, str]:
         text = (template_folder() / "pair_lanes.c").read_text(encoding="utf-8")
-        return {"pair_lanes.c": text, **pair_headers()}
+        return {"pair_lanes.c": text, **group_headers()}
 
     path = build_source(files, "pair_lanes.c", namespace="pair_lanes", definition="pair_lanes", more_flags=("-O3",))
     if path is None:

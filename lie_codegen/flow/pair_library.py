@@ -9,7 +9,7 @@ from typing import Any
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.errors import CompileError, ComputationError
 from lie_codegen.runtime.backend import load_library
-from lie_codegen.runtime.pair_headers import pair_headers
+from lie_codegen.runtime.pair_headers import group_headers
 from lie_codegen.runtime.sources import build_source
 
 #: Of the pair 8(5,3).
@@ -61,7 +61,7 @@ def pair_library() -> Any:
         text = (template_folder() / "pair853.c").read_text(encoding="utf-8")
         return {
             "pair853.c": text,
-            **pair_headers(),
+            **group_headers(),
             "pair_hermite.h": (template_folder() / "pair_hermite.h").read_text(encoding="utf-8"),
         }
 

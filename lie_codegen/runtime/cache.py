@@ -17,6 +17,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import stat
 import weakref
 from collections.abc import Iterator, Sequence
@@ -222,8 +223,6 @@ def _file_digest(path: Path) -> str:
 
 def remove_scratch(home: Path) -> None:
     """Remove a folder of `scratch`, whatever a compiler left in it."""
-    import shutil  # loads three compressors
-
     shutil.rmtree(home, ignore_errors=True)
 
 

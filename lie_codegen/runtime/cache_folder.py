@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import shutil
 import stat
 from functools import cache
 from pathlib import Path
@@ -103,6 +104,4 @@ def _temporary() -> Path:
 def _remove(folder: Path, owner: int) -> None:
     """A child of `os.fork` leaves it to its parent, which made it and may go on using it."""
     if os.getpid() == owner:
-        import shutil
-
         shutil.rmtree(folder, ignore_errors=True)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import importlib.util
 import os
+import shlex
+import shutil
+import signal
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -91,10 +94,10 @@ def find_compilers(environment: Mapping[str, str] | None = None) -> tuple[Compil
     found: dict[str, Compiler] = {}
     asked, further = _asked(variables), _words(variables, "LIE_CODEGEN_CFLAGS")
     for command in _ladder(variables):
-        program = _found(command[0], variables.get("PATH", ""))
+        program = shutil.which(command[0], path=variables.get("PATH", ""))
         if program is None:
             if command in asked:
-                warn_passed_over(_joined(command), "there is no such program (see $LIE_CODEGEN_CC, $CC)")
+                warn_passed_over(shlex.join(command), "there is no such program (see $LIE_CODEGEN_CC, $CC)")
             continue
         extra = command[1:] if command[1:2] != ("-m",) else ()
         real = _zig_program() if command[1:2] == ("-m",) else os.path.realpath(program)
@@ -151,7 +154,7 @@ def compile_library(compiler: Compiler, folder: Path, main: str, output: str, fl
             return
         if os.strerror(errno.ENOSPC) in printed:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        report = f"{_joined(command)}\nexit status {status}\n{printed[-4000:].strip()}"
+        report = f"{shlex.join(command)}\nexit status {status}\n{printed[-4000:].strip()}"
         # A negative status is a signal to the compiler's driver; its parts are killed alone, and then it says so.
         if status < 0 or any(words in printed for words in _STOPPED):
             raise CompilerStoppedError("the C compiler was stopped (too little memory?):\n" + report)
@@ -188,20 +191,18 @@ def _run(command: tuple[str, ...], folder: Path) -> tuple[int, str]:
                 _end(running)
                 if isinstance(stopped, subprocess.TimeoutExpired):
                     raise CompilerStoppedError(
-                        f"the C compiler gave no answer in {compile_seconds():g} s: {_joined(command)}; "
+                        f"the C compiler gave no answer in {compile_seconds():g} s: {shlex.join(command)}; "
                         "LIE_CODEGEN_COMPILE_SECONDS allows it more"
                     ) from None
                 raise
     except OSError as error:
-        raise CompilerStoppedError(f"cannot run {_joined(command)}: {error}") from error
+        raise CompilerStoppedError(f"cannot run {shlex.join(command)}: {error}") from error
     return running.returncode, printed.decode(errors="replace")
 
 
 def _end(running: Any) -> None:
     with contextlib.suppress(OSError):
         if hasattr(os, "killpg"):
-            import signal
-
             os.killpg(running.pid, signal.SIGKILL)
         else:
             running.kill()
@@ -225,44 +226,21 @@ def _asked(variables: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
 
 def _words(variables: Mapping[str, str], name: str) -> tuple[str, ...]:
     """A variable as a shell would split it; nothing where its quotes do not close."""
-    given = variables.get(name, "")
-    if not given:
-        return ()
-    import shlex
-
     try:
-        return tuple(shlex.split(given))
+        return tuple(shlex.split(variables.get(name, "")))
     except ValueError:
         return ()
-
-
-def _joined(command: tuple[str, ...]) -> str:
-    """As a shell would take it."""
-    import shlex
-
-    return shlex.join(command)
-
-
-def _found(program: str, path: str) -> str | None:
-    """The file of a program; on Windows, where endings count, by shutil, which loads three compressors in every process."""
-    if os.name == "nt":
-        import shutil
-
-        return shutil.which(program, path=path)
-    folders = [""] if os.path.dirname(program) else path.split(os.pathsep) if path else []
-    files = (os.path.join(folder, program) for folder in folders)
-    return next((file for file in files if os.path.isfile(file) and os.access(file, os.X_OK)), None)
 
 
 def _ladder(variables: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
     yield from _asked(variables)
     yield from (("cc",), ("gcc",), ("clang",))
-    if sys.executable and PathFinder.find_spec("ziglang") is not None:
+    if sys.executable and importlib.util.find_spec("ziglang") is not None:
         yield (sys.executable, "-m", "ziglang", "cc")
 
 
 def _zig_program() -> str:
-    spec = PathFinder.find_spec("ziglang")
+    spec = importlib.util.find_spec("ziglang")
     return os.path.realpath(spec.origin) if spec is not None and spec.origin else "ziglang"
 
 

@@ -7,8 +7,13 @@ from lie_codegen.runtime import dop853
 
 
 def pair_headers() -> dict[str, str]:
-    """The headers of one step, which ode.c and pair853.c include."""
+    """The headers of one step, of vectors and of groups."""
     return {"pair_step.h": _template("pair_step.h"), "ode_table.h": _step_table()}
+
+
+def group_headers() -> dict[str, str]:
+    """The headers of steps on groups, of one member and of many."""
+    return {**pair_headers(), "pair_control.h": _template("pair_control.h")}
 
 
 def dense_headers() -> dict[str, str]:

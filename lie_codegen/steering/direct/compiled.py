@@ -17,7 +17,14 @@ from lie_codegen.steering.direct.numpy_search import NumpySearch
 from lie_codegen.steering.direct.programme import Goal, Machine, Programme, Reached, Settings
 
 _CORE = "direct_core.c"
-_HEADERS = ("direct_lanes.h", "direct_algebra.h", "direct_chain.h", "direct_steps.h", "direct_newton.h")
+_HEADERS = (
+    "lane_vectors.h",
+    "direct_lanes.h",
+    "direct_algebra.h",
+    "direct_chain.h",
+    "direct_steps.h",
+    "direct_newton.h",
+)
 _SIZES = "direct_sizes.h"
 _ALIGNED = 64
 
