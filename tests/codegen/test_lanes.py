@@ -241,6 +241,10 @@ def _no_whole_rows(ops: Any, x: Any) -> tuple[Any, ...]:
     return [x + k for k in range(9)], [x * k for k in range(11)]
 
 
+def _large_before_small(ops: Any, x: Any) -> tuple[Any, ...]:
+    return [x + k for k in range(65)], [x * k for k in range(6)]
+
+
 def _long_body(ops: Any, x: Any) -> tuple[Any, ...]:
     y = x
     for k in range(200):
@@ -249,7 +253,7 @@ def _long_body(ops: Any, x: Any) -> tuple[Any, ...]:
 
 
 @pytest.mark.parametrize("shift", [0, 1, 2])
-@pytest.mark.parametrize("body", [_short_body, _whole_rows, _no_whole_rows, _long_body])
+@pytest.mark.parametrize("body", [_short_body, _whole_rows, _no_whole_rows, _large_before_small, _long_body])
 def test_results_beyond_the_caches_are_the_same(body: Any, shift: int) -> None:
     """Streaming stores serve arrays of 16 MiB and more that begin at 16 bytes, as they are made from 64 on; the others do not use them."""
 
