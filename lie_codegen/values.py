@@ -66,9 +66,9 @@ def settle(record: Any, **kept: Any) -> None:
         object.__setattr__(record, name, value)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Later:
-    """A field's value that is made when it is first asked for; see `Deferred`."""
+    """A field's value that is made when it is first asked for; see `Deferred`. Nobody is handed one: it need not be frozen."""
 
     make: Callable[[], Any]
 

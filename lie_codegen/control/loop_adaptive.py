@@ -18,7 +18,9 @@ from lie_codegen.flow.gauss_steps import gauss
 from lie_codegen.flow.pair853 import PairRun, integrate
 from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
+from lie_codegen.mechanics.states import elements_of
 from lie_codegen.runtime.library import Library
+from lie_codegen.runtime.outputs import copied
 
 #: The relative part of a tolerance that is absolute: rounding.
 _ROUNDING = 1e-15
@@ -47,8 +49,8 @@ def _system(run: Run) -> System:
     return run.system
 
 
-def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
-    """(k, N, m) or (k, m) states at the times, and the run.
+def adaptive(run: Run, tolerance: float) -> PairRun:
+    """The run by the pair; `motion_of` and `states_of` say what it went through.
 
     Raises:
         ComputationError: as `integrate`.
@@ -57,16 +59,32 @@ def adaptive(run: Run, tolerance: float) -> tuple[Array, PairRun]:
     X0, behind = _parted(run.loop, run.start)
     y0 = np.zeros((len(behind), system.group + behind.shape[1]))
     y0[:, system.group :] = behind
-    found = integrate(
+    return integrate(
         system, np.ascontiguousarray(X0), y0, run.times, rtol=_ROUNDING, atol=tolerance,
         where=f"closed_loop({run.loop.plant.namespace})", threads=run.threads,
     )  # fmt: skip
-    states = joined(run.loop, found.X, found.y)
-    return (states if run.many else states[:, 0]), found
+
+
+def states_of(run: Run, pair: PairRun) -> Array:
+    """(k, N, m) or (k, m) states at the times."""
+    states = joined(run.loop, pair.X, pair.y)
+    return states if run.many else states[:, 0]
+
+
+def motion_of(run: Run, pair: PairRun) -> tuple[Array, Array]:
+    """X and xi at the times, as the plant splits those states: of a body by itself from where they stand already."""
+    plant = run.loop.plant
+    if run.loop.own_ports or not isinstance(plant, GroupPlant):
+        return plant.split(states_of(run, pair))
+    X, y = (pair.X, pair.y) if run.many else (pair.X[:, 0], pair.y[:, 0])
+    return elements_of(plant.group, X), copied(y[..., y.shape[-1] - plant.sizes[1] :])
 
 
 def _parted(loop: Loop, states: Array) -> tuple[Array, Array]:
     """Elements and vectors of (N, m) states: the inverse of `joined`."""
+    if not loop.own_ports:
+        size = loop.plant.sizes[0]
+        return states[:, :size], states[:, size:]
     elements, vectors = columns(loop)
     if not vectors or elements[-1] < vectors[0]:
         return states[:, : len(elements)], states[:, len(elements) :]

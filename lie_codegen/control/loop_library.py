@@ -13,6 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
 from lie_codegen.control.loop_model import SIGMAS, Loop, loop_model
 from lie_codegen.control.loop_rate import has_rate, loop_rate, loop_settle
+from lie_codegen.control.positive_batch import clear_inverses
 from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.identifiers import shown
@@ -99,8 +100,8 @@ def loop_numbers(
         raise InputError("closed_loop: the inertia is one a loop already; the law takes that of the body")
     numbers: dict[str, Array] = {}
     if body:
-        metric = checked(body["inertia"], inertia)
-        numbers = {"inertia": metric, "inertia_inverse": np.ascontiguousarray(np.linalg.inv(metric))}
+        metric, inverse = _checked(body["inertia"], inertia)
+        numbers = {"inertia": metric, "inertia_inverse": np.linalg.inv(metric) if inverse is None else inverse}
     for name, port in of_law.items():
         if name in numbers:
             continue
@@ -162,6 +163,11 @@ def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
     Raises:
         ShapeError, NotFiniteError, InputError: naming the first that is not.
     """
+    return _checked(port, value, positive=positive)[0]
+
+
+def _checked(port: Port, value: ArrayLike, *, positive: bool = True) -> tuple[Array, Array | None]:
+    """The same, and the inverses of matrices where looking at them found these."""
     try:
         array = np.array(value, dtype=float, order="C")  # ascontiguousarray would make a number an array of one
     except (TypeError, ValueError, OverflowError):
@@ -172,7 +178,10 @@ def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
     if not np.all(np.isfinite(array)):
         raise NotFiniteError(f"closed_loop: {port.name} holds NaN or infinity")
     if not positive:
-        return array
+        return array, None
+    inverses = clear_inverses(array) if array.ndim == 3 and len(port.shape) == 2 else None
+    if inverses is not None:
+        return array, inverses
     if len(port.shape) == 2:
         least = np.linalg.eigvalsh((array + np.swapaxes(array, -1, -2)) / 2)[..., 0]
         skew = np.max(np.abs(array - np.swapaxes(array, -1, -2)), axis=(-1, -2))
@@ -184,7 +193,7 @@ def checked(port: Port, value: ArrayLike, *, positive: bool = True) -> Array:
         first = int(np.flatnonzero(bad)[0])
         where = f" of loop {first}" if array.ndim == ranks[1] else ""
         raise InputError(f"closed_loop: {port.name}{where} is not {wanted}")
-    return array
+    return array, None
 
 
 def several(start: Array, many: bool, loops: int | None, runs: Any) -> tuple[Array, bool]:

@@ -73,7 +73,7 @@ def prepared(method: str, **arguments: Any) -> Prepared:
         InputError, ShapeError, NotFiniteError: naming the argument.
     """
     try:
-        call = _Call((method, *map(_known, arguments.values())))
+        call = _Call((method, *[None if value is None else _known(value) for value in arguments.values()]))
     except _UnknowableError:
         return _prepare(method, arguments)
     call.arguments = arguments
@@ -110,12 +110,12 @@ def _known(value: Any) -> Hashable:
     Raises:
         _UnknowableError: it may change, or is large.
     """
-    if value is None:
-        return None
     kind = type(value)
     if kind is np.ndarray and value.dtype.kind in "fiub" and value.nbytes <= _BYTES:
-        return value.shape, value.dtype.str, value.tobytes()
-    if kind in (float, int, bool) or (kind is str and not value.endswith(".toml") and value != "-"):
+        return value.shape, value.dtype, value.tobytes()
+    if value is None or kind is float or kind is int or kind is bool:
+        return kind, value
+    if kind is str and not value.endswith(".toml") and value != "-":
         return kind, value
     if kind in (list, tuple) and len(value) <= _ENTRIES:
         return kind, *map(_known, value)

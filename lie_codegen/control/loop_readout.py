@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.control.loop_adaptive import motion_of, states_of
 from lie_codegen.control.loop_arguments import LoopArguments
 from lie_codegen.control.loop_origin import LoopMaking, loop_origin
 from lie_codegen.control.loop_result import ClosedLoop
@@ -21,34 +22,39 @@ from lie_codegen.values import Later
 def result_of(
     run: Run,
     told: LoopArguments,
-    found: Array,
+    found: Array | PairRun,
     count: int,
     error: float,
-    pair: PairRun | None = None,
     events: tuple[EventHits, ...] = (),
 ) -> ClosedLoop:
     """The closed loop of states (k, m), or (k, N, m) of N loops, at its times, with what made it.
 
     Args:
         run, told: the loop and its arguments.
-        found: the states.
+        found: the states, or the adaptive run that has them.
         count: steps from one output to the next, where they are equal.
         error: estimate on the entries.
-        pair: steps of the adaptive run, if it was one.
         events: what was found along it.
     """
     loop, times = run.loop, run.times
-    X, xi = loop.plant.split(found)
-    states = own_states(loop, found, sampled=bool(run.sample))
+
+    pair = found if isinstance(found, PairRun) else None
+
+    def course() -> Array:
+        return states_of(run, found) if isinstance(found, PairRun) else found
+
+    X, xi = loop.plant.split(course()) if pair is None else motion_of(run, pair)
+    states = own_states(loop, course(), sampled=bool(run.sample)) if loop.own_ports else {}
     moves = run.reference(times)
     made: list[tuple[dict[str, Array], Array | None]] = []
 
     def said() -> tuple[dict[str, Array], Array | None]:
         # what nobody asks for is not computed; who asks for one of the two gets both
         if not made:
-            outputs, u = _outputs(run, found, moves)
+            whole = course()
+            outputs, u = _outputs(run, whole, moves)
             if run.sample and loop.law is not None:
-                u = np.ascontiguousarray(found[..., -loop.plant.sizes[2] :])
+                u = np.ascontiguousarray(whole[..., -loop.plant.sizes[2] :])
             made.append(({**outputs, **{name: value for name, value in states.items() if name not in outputs}}, u))
         return made[0]
 

@@ -215,6 +215,13 @@ def _of_first_order(loop: Loop, errors: list[float]) -> bool:
     return held and len(errors) > 3 and all(b > a / 3 for a, b in zip(errors[-4:-1], errors[-3:], strict=True))
 
 
+#: What a loop without noise draws.
+_NOTHING = np.zeros(0, dtype=np.uint32)
+_NOTHING.flags.writeable = False
+
+
 def noise_stream(loop: Loop, seed: int, first: int) -> NoiseStream:
     """What a loop draws."""
+    if not loop.noise:
+        return NoiseStream(seed % 2**64, _NOTHING, first)
     return NoiseStream.of(seed, [NOISE.index(kind) for kind in loop.noise], loop.noise_sizes, first)

@@ -58,9 +58,9 @@ def loop_by(
     if told.step is not None:
         return result_of(run, told, run.states(told.parts), told.parts, float("nan"))
     if by_pair:
-        found, pair = adaptive(run, told.rtol)
+        pair = adaptive(run, told.rtol)
         hits = loop_events(run, pair, events) if events else ()
-        return result_of(run, told, found, 0, pair.error_estimate, pair, hits)
+        return result_of(run, told, pair, 0, pair.error_estimate, hits)
     if run.system is not None:
         run = run_in_steps(run, told.model, told.reference)
     found, count, error = refined(run, told.rtol, narrower)

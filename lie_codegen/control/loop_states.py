@@ -20,6 +20,8 @@ def initial_own(loop: Loop, start: Array, given: Mapping[str, Any]) -> Array:
     Raises:
         InputError: a name that is no state. ShapeError, NotFiniteError: a value of another shape, or not finite.
     """
+    if not (loop.own_ports or given):
+        return start
     names = [each.name for each in loop.own_ports]
     unknown = [name for name in given if name not in names]
     if unknown:
@@ -53,10 +55,12 @@ def _flat(name: str, shape: tuple[int, ...], value: Any) -> Array:
 
 def own_states(loop: Loop, found: Array, sampled: bool) -> dict[str, Array]:
     """The own states by name, of (..., m) states; of a sampled loop as the law used them."""
+    states: dict[str, Array] = {}
+    if not loop.own_ports:
+        return states
     place = sum(loop.plant.sizes[:2])
     if sampled:
         place += sum(loop.own_size(each.port) for each in loop.own_ports)
-    states = {}
     for each in loop.own_ports:
         size = loop.own_size(each.port)
         flat = np.ascontiguousarray(found[..., place : place + size])

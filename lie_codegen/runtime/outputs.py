@@ -27,6 +27,15 @@ def empty(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
     return doubles.view(dtype)[: prod(shape)].reshape(shape)
 
 
+def copied(values: Array) -> Array:
+    """A copy in C order, in memory as `empty` gives it."""
+    if values.nbytes < _FROM:
+        return values.copy()
+    array = empty(values.shape, values.dtype)
+    array[...] = values
+    return array
+
+
 def idle_bytes() -> int:
     """Memory of results that are gone, kept for the next ones: 512 MB or a quarter of the machine's at most; given back when idle."""
     module = extension()

@@ -61,7 +61,7 @@ class InputNumbers:
     breakpoints: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class KnownInput(Later):
     """The formulas of an input whose numbers are known from before."""
 

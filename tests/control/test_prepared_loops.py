@@ -62,6 +62,24 @@ def test_what_the_caller_does_with_his_arrays_changes_no_later_call() -> None:
     np.testing.assert_array_equal(again.t, TIMES)
 
 
+@pytest.mark.parametrize("loops", [1, 300])
+def test_what_the_caller_does_with_what_he_gave_or_got_changes_nothing_that_is_computed_later(loops: int) -> None:
+    X0, xi0 = np.repeat(TURN[None], loops, axis=0), np.full((loops, 3), 0.3)
+    bodies = np.repeat(np.diag([1.0, 2.0, 3.0])[None], loops, axis=0)
+    given: dict[str, Any] = {"X0": X0, "xi0": xi0, "inertia": bodies, "gains": {"k_p": 4.0, "k_d": 6.0}}
+    if loops == 1:
+        given |= {"X0": X0[0], "xi0": xi0[0], "inertia": bodies[0]}
+    control = lc.attitude_law("pd", tunable=True)
+    told, asked = run(control, **given), run(control, **given)
+    wanted = told.u.copy(), told.outputs["torque"].copy(), told.origin, told.error.copy()
+    for mine in (X0, xi0, bodies, asked.X, asked.xi, asked.t):
+        mine[:] = 7.0
+    np.testing.assert_array_equal(asked.u, wanted[0])
+    np.testing.assert_array_equal(asked.outputs["torque"], wanted[1])
+    assert asked.origin.start.tolist() == wanted[2].start.tolist()
+    assert asked.origin.numbers["inertia"].tolist() == wanted[2].numbers["inertia"].tolist()
+
+
 def test_what_was_warned_of_is_warned_of_again() -> None:
     control = lc.attitude_law("pd", inertia=[1, 2, 3], k_p=4, k_d=6)
     heard = []

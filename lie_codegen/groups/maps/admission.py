@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,16 +97,19 @@ def _matrix(group: MatrixGroup, X: ArrayLike, where: str) -> Array:
     try:
         given = np.asarray(X)
         real = not group.is_complex
-        if real and np.iscomplexobj(given) and np.any(given.imag != 0):
-            raise ShapeError(f"{where}: complex entries, but {group.name} is a group of real matrices")
-        matrix = np.ascontiguousarray(given.real if real else given, dtype=group.basis.dtype)
+        if real and given.dtype.kind == "c":
+            if np.any(given.imag != 0):
+                raise ShapeError(f"{where}: complex entries, but {group.name} is a group of real matrices")
+            given = given.real
+        matrix = np.ascontiguousarray(given, dtype=group.basis.dtype)
     except (TypeError, ValueError) as error:
         if isinstance(error, ShapeError):
             raise
         raise ShapeError(f"{where}: no array of numbers; give a ({d}, {d}) matrix") from None
     if matrix.shape != (d, d):
         raise ShapeError(f"{where} has shape {matrix.shape}; an element of {group.name} is ({d}, {d})")
-    if not np.all(np.isfinite(matrix)):
+    # a sum of squares is finite only where all of them are; one of finite entries may leave the range
+    if not isfinite(np.vdot(matrix, matrix).real) and not np.all(np.isfinite(matrix)):
         raise NotFiniteError(f"{where} holds NaN or infinity")
     return matrix
 
