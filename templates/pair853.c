@@ -4,7 +4,9 @@
  * y holds Theta (the first `group` entries), then xi, then what else there is. Within a step X = X_0 exp(Theta), Theta' = dexp^-1 xi, so
  * that the pair sees a vector; after it X_0 <- X_0 exp(Theta), Theta = 0. F and the product are kernels, given by address:
  *     rate(X_0, y, t, numbers...) -> y'        move(X_0, Theta) -> X_0 exp(Theta)
- * One member; many go on lanes, with pair_lanes.c.
+ * Or y begins with the elements themselves, unit quaternions and other entries, the first `front` of it, and there is no Theta (`group` is 0):
+ *     rate(y, t, numbers...) -> y'             move(y) -> X                lift(X) -> the elements of y
+ * After a step q <- q/|q|. One member; many go on lanes, with pair_lanes.c.
  *
  * States are wanted at given times. A step ends there if two or more such times lie in it; a single one is reached by a step
  * of its own beside, since the interpolant of the pair errs a hundred times more than its steps. Where xi is part of y and the rate does not
@@ -21,11 +23,11 @@
 typedef void (*Call)(const double *const *in, double *const *out);
 
 typedef struct {
-    Call rate, move;
-    ptrdiff_t packed, group, size, numbers;
+    Call rate, move, lift;          /* lift: NULL if y begins with Theta */
+    ptrdiff_t packed, group, front, quaternions, size, numbers;
     const double *const *number;    /* inputs of the rate beside X, y and t */
     double t, t_low, h, rtol, atol, reach, longest; /* |Theta| stays within reach; h at most longest (the step to begin with, or 0) */
-    double *X, *y;                  /* packed, size with room for the padding behind */
+    double *X, *y;                  /* packed, size with room for the padding behind; with elements in y X is where they begin */
     const double *times;            /* that are wanted, all after t at the start */
     ptrdiff_t count, next;          /* of them; those that are done */
     double *X_out, *y_out;          /* count x packed, count x size */
@@ -36,7 +38,6 @@ typedef struct {
     ptrdiff_t steps, rejected, evaluations;
     Brackets brackets;              /* of pair_between, as what follows: of the algebra, if xi are the entries of y behind Theta */
     double *dense;                  /* room for `between_size` */
-    double between;                 /* the largest error that an interpolated state was found to have, over what steps are allowed */
 } Pair;
 
 /* The parts of `work`. */
@@ -69,26 +70,75 @@ static void rates(Pair *p, const double *X, const double *y, double t, double *t
 {
     const double *in[3 + MOST_NUMBERS];
     double *out[1];
-    in[0] = X;
-    in[1] = y;
-    in[2] = &t;
+    int first = 0;
+    if (!p->lift) {
+        in[first++] = X;
+    }
+    in[first++] = y;
+    in[first++] = &t;
     out[0] = to;
     for (ptrdiff_t k = 0; k < p->numbers; ++k) {
-        in[3 + k] = p->number[k];
+        in[first + k] = p->number[k];
     }
     ++p->evaluations;
     p->rate(in, out);
 }
 
-/* X <- X exp(Theta), Theta = 0. */
-static void settle(Pair *p, double *X, double *y)
+/* X <- X exp(Theta), Theta = 0; or q <- q/|q|. */
+static APART void settle(Pair *p, double *X, double *y)
 {
     const Room room = room_of(p);
     double *out[1] = {room.scratch};
     const double *in[2] = {X, y};
+    if (p->lift) {
+        for (ptrdiff_t k = 0; k < p->quaternions; ++k) {
+            double *q = y + 4 * k;
+            const double by = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+            for (int i = 0; i < 4; ++i) {
+                q[i] *= by;
+            }
+        }
+        return;
+    }
     p->move(in, out);
     memcpy(X, room.scratch, (size_t)p->packed * sizeof(double));
     memset(y, 0, (size_t)p->group * sizeof(double));
+}
+
+/* The elements of y from X, where y holds them. */
+EXPORT void pair_lift(Pair *p);
+EXPORT void pair_lift(Pair *p)
+{
+    const double *in[1] = {p->X};
+    double *out[1] = {p->y};
+    if (p->lift) {
+        p->lift(in, out);
+        settle(p, p->X, p->y);
+    }
+}
+
+/* X of a state. */
+static void express(const Pair *p, const double *X, const double *y, double *to)
+{
+    const double *in[1] = {y};
+    double *out[1] = {to};
+    if (p->lift) {
+        p->move(in, out);
+    } else {
+        memcpy(to, X, (size_t)p->packed * sizeof(double));
+    }
+}
+
+/* What a knot keeps of X. */
+static ptrdiff_t kept(const Pair *p)
+{
+    return p->lift ? 0 : p->packed;
+}
+
+/* The size of entry i by which its relative error is judged. Entries of Theta are those of X, whose size is one; so are elements, at least. */
+static double size_of(const Pair *p, ptrdiff_t i, double largest)
+{
+    return i < p->group || (i < p->front && largest < 1.0) ? 1.0 : largest;
 }
 
 /* Where in a run the slopes are asked for: within a step X stays. */
@@ -105,14 +155,14 @@ static int slope_of(const void *who, double t, const double *y, double *slope)
 }
 
 /* The stages of a step of length h behind the first, k[0], and the state after it. */
-static void advance(Pair *p, const double *X, const double *y, double t, double h, double *k, double *stage, double *after)
+static APART void advance(Pair *p, const double *X, const double *y, double t, double h, double *k, double *stage, double *after)
 {
     Within within = {p, X};
     pair_step(slope_of, &within, wide(p), t, y, h, k, stage, after);
 }
 
 /*
- * The error of a step over what is allowed. Entries of Theta are those of X, whose size is one. Negative where |Theta| goes beyond its reach; NaN shows.
+ * The error of a step over what is allowed. Negative where |Theta| goes beyond its reach; NaN shows.
  */
 static double judged(const Pair *p, const double *y, const double *after, double h, const double *k)
 {
@@ -120,7 +170,7 @@ static double judged(const Pair *p, const double *y, const double *after, double
     double five = 0.0, three = 0.0, angle = 0.0, error;
     pair_errors(k, wide(p), room.more, room.last);
     for (ptrdiff_t i = 0; i < p->size; ++i) {
-        const double a = fabs(y[i]), b = fabs(after[i]), size = i < p->group ? 1.0 : a > b ? a : b;
+        const double a = fabs(y[i]), b = fabs(after[i]), size = size_of(p, i, a > b ? a : b);
         const double units = 1.0 / (p->atol + p->rtol * size), e5 = units * room.more[i], e3 = units * room.last[i];
         five += e5 * e5;
         three += e3 * e3;
@@ -132,7 +182,7 @@ static double judged(const Pair *p, const double *y, const double *after, double
 
 static void keep(Pair *p, const double *X, const double *y)
 {
-    memcpy(p->X_out + p->next * p->packed, X, (size_t)p->packed * sizeof(double));
+    express(p, X, y, p->X_out + p->next * p->packed);
     memcpy(p->y_out + p->next * p->size, y, (size_t)p->size * sizeof(double));
     ++p->next;
 }
@@ -143,7 +193,7 @@ static void mark(Pair *p, double h, const double *slope, const double *theta)
     const ptrdiff_t at = p->knots;
     p->knot_t[at] = p->t;
     p->knot_h[at] = h;
-    memcpy(p->knot_X + at * p->packed, p->X, (size_t)p->packed * sizeof(double));
+    memcpy(p->knot_X + at * kept(p), p->X, (size_t)kept(p) * sizeof(double));
     memcpy(p->knot_y + at * p->size, p->y, (size_t)p->size * sizeof(double));
     if (p->knot_slope) {
         memcpy(p->knot_slope + at * p->size, slope, (size_t)p->size * sizeof(double));
@@ -151,91 +201,132 @@ static void mark(Pair *p, double h, const double *slope, const double *theta)
     }
 }
 
+/* Where a run is: the step that is tried next, of length h, where `wish` could be and the next wanted time is `gap` away. */
+typedef struct {
+    double gap, wish, h;
+    ptrdiff_t taken;
+    int ends, fresh; /* whether the step ends at a wanted time; whether its first slope is still to be had */
+} Course;
+
+/* Behind the results of a run: there is a step to try. */
+enum { GO = -1 };
+
+static void begin(Pair *p, Course *c)
+{
+    const Room room = room_of(p);
+    c->taken = c->fresh = 0;
+    p->knots = 0;
+    memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
+    rates(p, p->X, p->y, p->t, room.k);
+    if (p->h <= 0.0) {
+        p->h = first_step(p->size, 1, p->y, room.k);
+    }
+}
+
+/* The next step to try and its first slope; DONE: the last time is reached, with what it needs as a knot; FULL: there is no room. */
+static APART ptrdiff_t propose(Pair *p, Course *c, ptrdiff_t most_steps)
+{
+    const Room room = room_of(p);
+    double gap;
+    if (p->next >= p->count) {
+        if (p->knot_slope) {
+            rates(p, p->X, p->y, p->t, room.k);
+            mark(p, 0.0, room.k, p->y);
+        }
+        return DONE;
+    }
+    if (c->taken == most_steps || (p->knot_t && p->knots == p->room)) {
+        return FULL;
+    }
+    ++c->taken;
+    c->gap = gap = p->times[p->next] - p->t - p->t_low;
+    c->h = c->wish = p->h < p->longest ? p->h : p->longest;
+    c->ends = 0;
+    if (gap <= c->h * (1 + 1e-10)) { /* the next time lies within: end there if it is the last, or not alone */
+        c->ends = p->next + 1 == p->count || p->times[p->next + 1] - p->t <= c->h || gap > 0.7 * c->h;
+        c->h = c->ends ? gap : c->h;
+    } else if (gap < 1.9 * c->h) {
+        c->h = 0.5 * gap; /* not a step and a crumb */
+    }
+    if (c->fresh) { /* the last slope of the step before is of no use: it was at Theta, and now X holds exp(Theta) and Theta is zero */
+        rates(p, p->X, p->y, p->t, room.k);
+        c->fresh = 0;
+    }
+    return GO;
+}
+
+/* The stages of the step are there: it is taken, or another is to be tried (GO); why there can be no other. */
+static APART ptrdiff_t conclude(Pair *p, Course *c)
+{
+    const Room room = room_of(p);
+    const double error = judged(p, p->y, room.after, c->h, room.k);
+    if (!(error <= 1.0) || error < 0.0) {
+        ++p->rejected;
+        /* Theta grows about as h does: the first length ends at 0.9 of its reach */
+        p->h = shorter(c->h, error < 0.0 ? 0.9 / -error : longer(error));
+        if (vanishes(p->h, p->t)) {
+            return error <= 1e300 ? STUCK : LOST;
+        }
+        return GO;
+    }
+    if (p->knot_t) {
+        mark(p, c->h, room.k, room.after);
+        ++p->knots;
+    }
+    ++p->steps;
+    if (!c->ends && c->gap <= c->h * (1 + 1e-10)) { /* a step of its own to the time within, from the same first stage */
+        double *X = room.aside, *next = room.more;
+        memcpy(X, p->X, (size_t)kept(p) * sizeof(double));
+        advance(p, p->X, p->y, p->t, c->gap, room.k, room.stage, next);
+        settle(p, X, next);
+        keep(p, X, next);
+    }
+    memcpy(p->y, room.after, (size_t)p->size * sizeof(double));
+    settle(p, p->X, p->y);
+    if (c->ends) {
+        p->t = p->times[p->next];
+        p->t_low = 0.0;
+        keep(p, p->X, p->y);
+    } else {
+        later(&p->t, &p->t_low, c->h);
+    }
+    p->h = next_length(c->h, c->wish, error > 0.0 ? longer(error) : 6.0);
+    c->fresh = 1;
+    return GO;
+}
+
 /* On to the last time, or until there is no room for more knots (FULL: call again). */
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps);
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
 {
     const Room room = room_of(p);
-    double *k = room.k, *stage = room.stage, *after = room.after;
-    int fresh = 0;
-    p->knots = 0;
-    memset(k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
-    rates(p, p->X, p->y, p->t, k);
-    if (p->h <= 0.0) {
-        p->h = first_step(p->size, 1, p->y, k);
+    Course c;
+    ptrdiff_t status;
+    begin(p, &c);
+    while ((status = propose(p, &c, most_steps)) == GO) {
+        advance(p, p->X, p->y, p->t, c.h, room.k, room.stage, room.after);
+        if ((status = conclude(p, &c)) != GO) {
+            break;
+        }
     }
-    for (ptrdiff_t taken = 0; p->next < p->count; ++taken) {
-        const double gap = p->times[p->next] - p->t - p->t_low;
-        double wish = p->h < p->longest ? p->h : p->longest, h = wish, error;
-        int ends = 0;
-        if (taken == most_steps || (p->knot_t && p->knots == p->room)) {
-            return FULL;
-        }
-        if (gap <= h * (1 + 1e-10)) { /* the next time lies within: end there if it is the last, or not alone */
-            ends = p->next + 1 == p->count || p->times[p->next + 1] - p->t <= h || gap > 0.7 * h;
-            h = ends ? gap : h;
-        } else if (gap < 1.9 * h) {
-            h = 0.5 * gap; /* not a step and a crumb */
-        }
-        if (fresh) { /* the last slope of the step before is of no use: it was at Theta, and now X holds exp(Theta) and Theta is zero */
-            rates(p, p->X, p->y, p->t, k);
-            fresh = 0;
-        }
-        advance(p, p->X, p->y, p->t, h, k, stage, after);
-        error = judged(p, p->y, after, h, k);
-        if (!(error <= 1.0) || error < 0.0) {
-            ++p->rejected;
-            /* Theta grows about as h does: the first length ends at 0.9 of its reach */
-            const double factor = error < 0.0 ? 0.9 / -error : 0.9 * pow(error, -1.0 / 8);
-            p->h = shorter(h, factor);
-            if (vanishes(p->h, p->t)) {
-                return error <= 1e300 ? STUCK : LOST;
-            }
-            continue;
-        }
-        if (p->knot_t) {
-            mark(p, h, k, after);
-            ++p->knots;
-        }
-        ++p->steps;
-        if (!ends && gap <= h * (1 + 1e-10)) { /* a step of its own to the time within, from the same first stage */
-            double *X = room.aside, *next = room.more;
-            memcpy(X, p->X, (size_t)p->packed * sizeof(double));
-            advance(p, p->X, p->y, p->t, gap, k, stage, next);
-            settle(p, X, next);
-            keep(p, X, next);
-        }
-        memcpy(p->y, after, (size_t)p->size * sizeof(double));
-        settle(p, p->X, p->y);
-        if (ends) {
-            p->t = p->times[p->next];
-            p->t_low = 0.0;
-            keep(p, p->X, p->y);
-        } else {
-            later(&p->t, &p->t_low, h);
-        }
-        p->h = next_length(h, wish, error > 0.0 ? 0.9 * pow(error, -1.0 / 8) : 6.0);
-        fresh = 1;
-    }
-    if (p->knot_slope) {
-        rates(p, p->X, p->y, p->t, k);
-        mark(p, 0.0, k, p->y);
-    }
-    return DONE;
+    return status;
 }
 
 /* The state of one member `part` of the way through the step from a knot, by a step of its own. */
-static void afresh(Pair *p, ptrdiff_t from, double part, double *X_out, double *y_out)
+static APART void afresh(Pair *p, ptrdiff_t from, double part, double *X_out, double *y_out)
 {
     const Room room = room_of(p);
-    const double *X = p->knot_X + from * p->packed, t = p->knot_t[from];
+    const double *X = p->knot_X + from * kept(p), t = p->knot_t[from];
     double *y = room.more;
     memset(y, 0, (size_t)wide(p) * sizeof(double));
     memcpy(y, p->knot_y + from * p->size, (size_t)p->size * sizeof(double));
-    memcpy(X_out, X, (size_t)p->packed * sizeof(double));
+    memcpy(X_out, X, (size_t)kept(p) * sizeof(double));
     rates(p, X, y, t, room.k);
     advance(p, X, y, t, part * p->knot_h[from], room.k, room.stage, room.after);
     settle(p, X_out, room.after);
+    if (p->lift) {
+        express(p, NULL, room.after, X_out);
+    }
     memcpy(y_out, room.after, (size_t)p->size * sizeof(double));
 }
 
@@ -254,43 +345,45 @@ EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *from, const d
 EXPORT ptrdiff_t between_size(ptrdiff_t group, ptrdiff_t size);
 EXPORT ptrdiff_t between_size(ptrdiff_t group, ptrdiff_t size)
 {
-    return fours(size - group) * NODES + fours(group) * TURN_NODES + 9 * group + turn_room(group) + 2 * (fours(group) + fours(size - group));
+    return 4 * (size - group) + fours(group) * (TURN_NODES + 2) + 9 * group + turn_room(group);
 }
 
-/* Newton's polynomials about one step. */
+/* The polynomials about one step. */
 typedef struct {
-    double place[KNOTS], turn_place[TURNS]; /* of knots, in lengths of the step from its beginning */
-    double *c, *turn, *spare;               /* coefficients of the vectors, and of Theta in the chart of the knot `centre`; nine of Theta, and more room */
+    Hermite behind;           /* of what follows Theta, or of all of y */
+    double turn_place[TURNS]; /* of knots, in lengths of the step from its beginning */
+    double *turn, *spare;     /* coefficients of Theta in the chart of the knot `centre`; nine of Theta, and more room */
     ptrdiff_t centre;
 } Between;
 
 /* Of step s of so many: the knots s, s + 1 first, then those beside, the nearer before the farther. */
-static void prepare_between(const Pair *p, ptrdiff_t steps, ptrdiff_t s, Between *b)
+static APART void prepare_between(const Pair *p, ptrdiff_t steps, ptrdiff_t s, Between *b)
 {
     const ptrdiff_t n = p->group, rest = p->size - n;
     const double h = p->knot_h[s];
-    Jet jets[KNOTS], turns[TURNS];
+    Jet turns[TURNS];
+    double *place = b->behind.place;
     ptrdiff_t low = s, high = s + 1;
     double below = 0.0, above = 1.0;
     for (int j = 0; j < KNOTS; ++j) {
         ptrdiff_t at = j ? high : low;
-        b->place[j] = j ? above : below;
+        place[j] = j ? above : below;
         if (j > 1) { /* one further on the side that is nearer, or that is there at all */
             const double down = low > 0 ? below - p->knot_h[low - 1] / h : -INFINITY, up = high < steps ? above + p->knot_h[high] / h : INFINITY;
             if (-down < up - 1.0) {
                 at = --low;
-                b->place[j] = below = down;
+                place[j] = below = down;
             } else {
                 at = ++high;
-                b->place[j] = above = up;
+                place[j] = above = up;
             }
         }
-        jets[j].of[0] = p->knot_y + at * p->size + n;
-        jets[j].of[1] = p->knot_slope + at * p->size + n;
+        b->behind.value[j] = p->knot_y + at * p->size + n;
+        b->behind.slope[j] = p->knot_slope + at * p->size + n;
     }
-    newton_2(rest, b->place, jets, h, b->c);
+    hermite(&b->behind, rest, h);
     b->centre = s > 0 ? s : 1;
-    for (int j = 0; j < TURNS; ++j) { /* the middle, the other end of the step, the knot on the far side */
+    for (int j = 0; n && j < TURNS; ++j) { /* the middle, the other end of the step, the knot on the far side */
         const ptrdiff_t c = b->centre, at = j == 0 ? c : (j == 1) == (c == s) ? c + 1 : c - 1;
         double *theta = b->spare + 3 * j * n, *first = theta + n, *second = first + n;
         const double *xi = p->knot_y + at * p->size + n, *xi_dot = p->knot_slope + at * p->size + n;
@@ -308,7 +401,9 @@ static void prepare_between(const Pair *p, ptrdiff_t steps, ptrdiff_t s, Between
         turns[j].of[2] = second;
         b->turn_place[j] = at == s ? 0.0 : at == s + 1 ? 1.0 : at < s ? -p->knot_h[at] / h : 1.0 + p->knot_h[s + 1] / h;
     }
-    newton_3(n, b->turn_place, turns, h, b->turn);
+    if (n) {
+        newton(n, b->turn_place, turns, h, b->turn);
+    }
 }
 
 /*
@@ -322,40 +417,46 @@ EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
     const ptrdiff_t n = p->group, rest = p->size - n;
     Between b;
     ptrdiff_t s = 0, made = -1;
-    b.c = p->dense;
-    b.turn = b.c + NODES * fours(rest);
+    b.behind.before = p->dense;
+    b.behind.last = b.behind.before + rest;
+    b.turn = b.behind.last + rest;
     b.spare = b.turn + TURN_NODES * fours(n);
     memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
     for (ptrdiff_t w = 0; w < p->count; ++w) {
         const double t = p->times[w];
-        double *X = p->X_out + w * p->packed, *y = p->y_out + w * p->size, part, error = INFINITY;
+        double *X = p->X_out + w * p->packed, *y = p->y_out + w * p->size, part;
+        int good;
         while (s + 1 < steps && p->knot_t[s + 1] <= t) {
             ++s;
         }
         part = w + 1 == p->count ? 1.0 : (t - p->knot_t[s]) / p->knot_h[s];
         if (steps + 1 >= KNOTS) {
-            double *theta = b.spare + 9 * n + turn_room(n), *behind = theta + fours(n), *last = behind + fours(rest), *after = last + fours(n);
+            double *theta = b.spare + 9 * n + turn_room(n), *behind = theta + fours(n), *last = behind + rest, *after = last + fours(n);
             if (made != s) {
                 prepare_between(p, steps, s, &b);
                 made = s;
             }
-            newton_3_at(n, b.turn_place, b.turn, part, theta, last);
-            newton_2_at(rest, b.place, b.c, part, behind, after);
-            error = 0.0;
+            if (n) {
+                newton_at(n, b.turn_place, b.turn, part, theta, last);
+            }
+            hermite_at(&b.behind, rest, p->knot_h[s], part, behind, after);
+            good = 1;
             for (ptrdiff_t i = 0; i < n; ++i) {
-                const double e = fabs(last[i]) / (p->atol + p->rtol);
-                error = e > error || e != e ? e : error;
+                good &= fabs(last[i]) <= most * (p->atol + p->rtol);
             }
             for (ptrdiff_t i = 0; i < rest; ++i) {
-                const double e = fabs(after[i]) / (p->atol + p->rtol * fabs(behind[i]));
-                error = e > error || e != e ? e : error;
+                good &= fabs(after[i]) <= most * (p->atol + p->rtol * size_of(p, n + i, fabs(behind[i])));
             }
-            if (error <= most) {
-                memcpy(X, p->knot_X + b.centre * p->packed, (size_t)p->packed * sizeof(double));
+            if (good) {
                 memset(y, 0, (size_t)n * sizeof(double));
                 memcpy(y + n, behind, (size_t)rest * sizeof(double));
-                settle(p, X, theta);
-                p->between = error > p->between ? error : p->between;
+                if (p->lift) {
+                    settle(p, X, y);
+                    express(p, NULL, y, X);
+                } else {
+                    memcpy(X, p->knot_X + b.centre * p->packed, (size_t)p->packed * sizeof(double));
+                    settle(p, X, theta);
+                }
                 continue;
             }
         }
@@ -363,78 +464,115 @@ EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
     }
 }
 
-/* From the start, X then y, to the last time at this tolerance, and the states at all times. */
-static ptrdiff_t whole(Pair *p, const double *start, const double *tolerance, ptrdiff_t most_steps, double most)
+/* From the start, X then y, at this tolerance to the last time, which alone is wanted on the way. */
+static Pair only_last(const Pair *p, const double *start, const double *tolerance)
 {
-    const double *times = p->times, t = p->t;
-    double *X = p->X_out, *y = p->y_out;
-    const ptrdiff_t count = p->count, last = count - 1;
-    ptrdiff_t status;
-    memcpy(p->X, start, (size_t)p->packed * sizeof(double));
-    memcpy(p->y, start + p->packed, (size_t)p->size * sizeof(double));
-    p->rtol = tolerance[0];
-    p->atol = tolerance[1];
-    p->h = p->t_low = p->between = 0.0;
-    p->next = p->steps = p->rejected = 0;
-    p->times += last;
-    p->X_out += last * p->packed;
-    p->y_out += last * p->size;
-    p->count = 1;
-    status = pair_run(p, most_steps);
-    p->times = times;
-    p->X_out = X;
-    p->y_out = y;
-    p->count = count;
-    if (status == DONE) {
-        pair_between(p, p->steps, most);
-    }
-    p->t = t;
-    return status;
+    Pair run = *p;
+    const ptrdiff_t last = p->count - 1;
+    memcpy(run.X, start, (size_t)p->packed * sizeof(double));
+    memcpy(run.y, start + p->packed, (size_t)p->size * sizeof(double));
+    pair_lift(&run);
+    run.rtol = tolerance[0];
+    run.atol = tolerance[1];
+    run.h = run.t_low = 0.0;
+    run.next = run.steps = run.rejected = run.evaluations = 0;
+    run.times += last;
+    run.X_out += last * p->packed;
+    run.y_out += last * p->size;
+    run.count = 1;
+    return run;
 }
 
-/* The largest |a - b|, or |a| alone; NaN shows. */
-static double largest(ptrdiff_t n, const double *a, const double *b)
+/* The largest |a - b|, or |a| alone; NaN where there is one. */
+static APART double largest(ptrdiff_t n, const double *a, const double *b)
 {
-    double most = 0.0;
+    double most[FOUR] = {0.0}, all[FOUR] = {0.0}; /* four at a time; a sum is NaN if a term is, and here nothing cancels */
     for (ptrdiff_t i = 0; i < n; ++i) {
         const double d = fabs(a[i] - (b ? b[i] : 0.0));
-        most = d > most || d != d ? d : most;
+        most[i % FOUR] = d > most[i % FOUR] ? d : most[i % FOUR];
+        all[i % FOUR] += d;
     }
-    return most;
+    for (int l = 1; l < FOUR; ++l) {
+        most[0] = most[l] > most[0] ? most[l] : most[0];
+        all[0] += all[l];
+    }
+    return all[0] != all[0] ? all[0] : most[0];
+}
+
+/* The stages of a step of each of two runs of one system, in turn: neither waits for the other, and a processor has both under way. */
+static void advance_both(Pair *const *p, const Course *c)
+{
+    const ptrdiff_t n = wide(p[0]);
+    for (int s = 1; s <= STAGES; ++s) {
+        for (int r = 0; r < 2; ++r) {
+            const Room room = room_of(p[r]);
+            pair_stage(s, n, p[r]->y, c[r].h, room.k, s < STAGES ? room.stage : room.after);
+            if (s < STAGES) {
+                rates(p[r], p[r]->X, room.stage, p[r]->t + C[s] * c[r].h, room.k + s * n);
+            }
+        }
+    }
 }
 
 /*
- * A run of one member at each of two tolerances (relative, absolute; of the first run, of the second; then by how
- * much the second keeps Theta shorter, so that it differs where the reach is what limits steps): the states of the first in
- * `other`, first those of X, and how far they are from those of the second: of X, of y, the size of the second, and the steps of the first.
+ * A run of one member at each of two tolerances (relative, absolute; of the run with longer steps, of `p`; then by how much p keeps Theta
+ * shorter, so that it differs where the reach is what limits steps). The other run has all that it works with `apart` doubles behind that of p, and
+ * gives its states to `other`, first those of X. Found: how far they are from those of p, X and y, the size of these, and the steps of the other.
  */
-EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, double *other, double *found);
-EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, double *other, double *found)
+EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, ptrdiff_t apart, double *other, double *found);
+EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, ptrdiff_t apart, double *other, double *found)
 {
-    double *X = p->X_out, *y = p->y_out;
     const ptrdiff_t elements = p->count * p->packed, vectors = p->count * p->size;
-    ptrdiff_t status;
-    double a, b;
-    p->X_out = other;
-    p->y_out = other + elements;
-    status = whole(p, start, tolerances, most_steps, most);
-    p->X_out = X;
-    p->y_out = y;
-    if (status != DONE) {
-        return status;
+    Pair coarse = *p, runs[2], *both[2] = {runs, runs + 1};
+    Course course[2];
+    ptrdiff_t status[2];
+    double **const parts[] = {&coarse.X, &coarse.y, &coarse.work, &coarse.dense, &coarse.knot_t, &coarse.knot_h, &coarse.knot_X, &coarse.knot_y, &coarse.knot_slope, &coarse.knot_theta};
+    for (size_t k = 0; k < sizeof parts / sizeof parts[0]; ++k) {
+        *parts[k] += apart;
     }
-    found[3] = (double)p->steps;
-    p->evaluations = 0;
-    p->reach *= tolerances[4];
-    status = whole(p, start, tolerances + 2, most_steps, most);
-    if (status == DONE) {
-        found[0] = largest(elements, other, X);
-        found[1] = largest(vectors, other + elements, y);
-        a = largest(elements, X, NULL);
-        b = largest(vectors, y, NULL);
-        found[2] = a > b ? a : b;
+    coarse.X_out = other;
+    coarse.y_out = other + elements;
+    runs[0] = only_last(&coarse, start, tolerances);
+    runs[1] = only_last(p, start, tolerances + 2);
+    runs[1].reach *= tolerances[4];
+    for (int r = 0; r < 2; ++r) {
+        begin(both[r], course + r);
+        status[r] = propose(both[r], course + r, most_steps);
     }
-    return status;
+    while (status[0] == GO || status[1] == GO) {
+        if (status[0] == GO && status[1] == GO) {
+            advance_both(both, course);
+        } else {
+            const Pair *one = both[status[1] == GO];
+            const Room room = room_of(one);
+            advance(both[status[1] == GO], one->X, one->y, one->t, course[status[1] == GO].h, room.k, room.stage, room.after);
+        }
+        for (int r = 0; r < 2; ++r) {
+            if (status[r] == GO && (status[r] = conclude(both[r], course + r)) == GO) {
+                status[r] = propose(both[r], course + r, most_steps);
+            }
+        }
+    }
+    for (int r = 0; r < 2; ++r) {
+        const Pair *all = r ? p : &coarse;
+        if (status[r] != DONE) {
+            return status[r];
+        }
+        runs[r].times = p->times;
+        runs[r].count = p->count;
+        runs[r].X_out = all->X_out;
+        runs[r].y_out = all->y_out;
+        pair_between(both[r], runs[r].steps, most);
+    }
+    found[0] = largest(elements, p->X_out, coarse.X_out);
+    found[1] = largest(vectors, p->y_out, coarse.y_out);
+    found[2] = largest(elements, p->X_out, NULL);
+    found[3] = largest(vectors, p->y_out, NULL);
+    found[4] = (double)runs[0].steps;
+    p->steps = runs[1].steps;
+    p->rejected = runs[1].rejected;
+    p->evaluations = runs[1].evaluations;
+    return DONE;
 }
 
 /*

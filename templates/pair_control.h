@@ -31,6 +31,12 @@ static double shorter(double h, double factor)
     return h * (factor > 0.2 ? factor : 0.2);
 }
 
+/* By how much a step may grow for an error of order 8, over what is allowed, or has to shrink. */
+static double longer(double error)
+{
+    return 0.9 / sqrt(sqrt(sqrt(error)));
+}
+
 /* Whether a step is so short that t + h would be t. */
 static int vanishes(double h, double t)
 {
@@ -40,8 +46,8 @@ static int vanishes(double h, double t)
 /* The length behind a step of length h, where `wish` could have been: a step that was cut says nothing against its length. */
 static double next_length(double h, double wish, double factor)
 {
-    const double longer = h * (factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor);
-    return h < wish && longer < wish ? wish : longer;
+    const double next = h * (factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor);
+    return h < wish && next < wish ? wish : next;
 }
 
 /* t + h, the sum in two doubles. */

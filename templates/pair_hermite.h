@@ -2,8 +2,8 @@
  * The states between the steps of one member of a second-order system, X' = X hat(xi), (xi, ...)' = F, without a further rate: what is
  * known where steps meet is enough.
  *
- * The vectors behind Theta and their slopes are known there: Hermite's polynomial over the KNOTS nearest, of degree 2 KNOTS - 1. Theta is
- * known at three knots of one chart: with X_c the element of the one in the middle, X_(c-1) = X_c exp(-Theta_(c-1)), X_(c+1) = X_c
+ * The vectors behind Theta and their slopes are known there: Hermite's polynomial over the KNOTS nearest, of degree 2 KNOTS - 1. So are all of
+ * y where it begins with the elements. Theta is known at three knots of one chart: with X_c the element of the one in the middle, X_(c-1) = X_c exp(-Theta_(c-1)), X_(c+1) = X_c
  * exp(Theta_c), and its first two derivatives follow from xi and xi': degree 8. Newton's form: its last terms say how far the polynomial
  * is from that of less data, which errs more.
  */
@@ -14,7 +14,9 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { KNOTS = 6, TURNS = 3, NODES = 2 * KNOTS, TURN_NODES = 3 * TURNS, FOUR = 4 };
+#include "pair_step.h"
+
+enum { KNOTS = 6, TURNS = 3, TURN_NODES = 3 * TURNS, FOUR = 4 };
 
 /* [A_i, A_j] = sum_k c A_k of so many (i, j, k), i < j. */
 typedef struct {
@@ -114,82 +116,196 @@ static void turn_jet(const Brackets *g, const double *theta, const double *xi, c
 }
 
 /*
- * Newton's polynomial of n entries of which TIMES derivatives are known at each of COUNT places, in lengths h: `newton_TIMES` makes the
- * coefficients, four entries a node, for registers; those behind the last entry are zeros. `newton_TIMES_at` gives its value at x, and in
- * `last` what the last BEHIND terms add to it: both with room for whole fours. Loops of known length, which the compiler unrolls.
+ * Hermite's polynomial through values and slopes at the KNOTS places, in lengths h of a step: the same weights for all entries. With
+ * l_k the polynomials of Lagrange, s_k = l_k'(x_k), the value at x is sum_k l_k^2 ((1 - 2 s_k (x - x_k)) y_k + (x - x_k) h y_k').
  */
-#define NEWTON(COUNT, TIMES, BEHIND)                                                                \
-    static void newton_##TIMES(ptrdiff_t n, const double *place, const Jet *jets, double h, double *to) \
+typedef struct {
+    double place[KNOTS];
+    double steep[KNOTS], scale[KNOTS];           /* s_k, 1/prod_j (x_k - x_j) */
+    const double *value[KNOTS], *slope[KNOTS];   /* n entries each */
+    double *before, *last;                       /* the last two terms of Newton's form, whose nodes are the places one after another, each twice */
+} Hermite;
+
+/* Four doubles anywhere in an array: of loops over local arrays gcc 12 makes scalar sums. */
+#if defined(__GNUC__)
+typedef double Quad __attribute__((vector_size(32), aligned(8), may_alias));
+#else
+typedef double Quad;
+#endif
+
+/* sum_k a_k y_k + b_k y_k', MANY entries from the first on. */
+#define WEIGHED(MANY, TYPE)                                                                         \
+    static inline void weighed_##MANY(const Hermite *p, const double *a, const double *b, ptrdiff_t first, double *to) \
     {                                                                                               \
-        enum { ALL = COUNT * TIMES };                                                               \
-        const double scale[3] = {1.0, h, 0.5 * h * h};                                              \
-        double over[COUNT][COUNT];                                                                  \
-        ptrdiff_t first;                                                                            \
-        int i, j, k, l;                                                                             \
-        for (i = 0; i < COUNT; ++i) {                                                               \
-            for (j = 0; j < i; ++j) {                                                               \
-                over[i][j] = 1.0 / (place[i] - place[j]);                                           \
+        enum { PARTS = MANY * sizeof(double) / sizeof(TYPE) };                                      \
+        TYPE sum[PARTS], more[PARTS];                                                               \
+        int k, l;                                                                                   \
+        for (l = 0; l < PARTS; ++l) {                                                               \
+            sum[l] = more[l] = (TYPE){0.0};                                                         \
+        }                                                                                           \
+        for (k = 0; k < KNOTS; ++k) {                                                               \
+            for (l = 0; l < PARTS; ++l) {                                                           \
+                sum[l] += a[k] * ((const TYPE *)(p->value[k] + first))[l];                          \
+                more[l] += b[k] * ((const TYPE *)(p->slope[k] + first))[l];                         \
             }                                                                                       \
         }                                                                                           \
-        for (first = 0; first < n; first += FOUR, to += FOUR * ALL) {                               \
-            const int wide = n - first < FOUR ? (int)(n - first) : FOUR;                            \
-            double known[ALL][FOUR] = {{0.0}}, c[ALL][FOUR]; /* of a place its derivatives over the factorials */ \
-            for (k = 0; k < ALL; ++k) {                                                             \
-                for (l = 0; l < wide; ++l) {                                                        \
-                    known[k][l] = scale[k % TIMES] * jets[k / TIMES].of[k % TIMES][first + l];      \
-                }                                                                                   \
-            }                                                                                       \
-            for (k = 0; k < ALL; ++k) {                                                             \
-                memcpy(c[k], known[k - k % TIMES], sizeof c[k]);                                    \
-            }                                                                                       \
-            for (j = 1; j < ALL; ++j) {                                                             \
-                for (i = ALL - 1; i >= j; --i) {                                                    \
-                    if (i % TIMES >= j) { /* the node and that j before it are one place */         \
-                        memcpy(c[i], known[i - i % TIMES + j], sizeof c[i]);                        \
-                    } else {                                                                        \
-                        const double by = over[i / TIMES][(i - j) / TIMES];                         \
-                        for (l = 0; l < FOUR; ++l) {                                                \
-                            c[i][l] = by * (c[i][l] - c[i - 1][l]);                                 \
-                        }                                                                           \
-                    }                                                                               \
-                }                                                                                   \
-            }                                                                                       \
-            memcpy(to, c, sizeof c);                                                                \
-        }                                                                                           \
-    }                                                                                               \
-                                                                                                    \
-    static void newton_##TIMES##_at(ptrdiff_t n, const double *place, const double *c, double x, double *value, double *last) \
-    {                                                                                               \
-        enum { ALL = COUNT * TIMES, FEW = ALL - BEHIND };                                           \
-        double by[COUNT], whole = 1.0;                                                              \
-        ptrdiff_t first;                                                                            \
-        int i, l;                                                                                   \
-        for (i = 0; i < COUNT; ++i) {                                                               \
-            by[i] = x - place[i];                                                                   \
-        }                                                                                           \
-        for (i = 0; i < FEW; ++i) {                                                                 \
-            whole *= by[i / TIMES];                                                                 \
-        }                                                                                           \
-        for (first = 0; first < n; first += FOUR, c += FOUR * ALL) {                                \
-            double sum[FOUR];                                                                       \
-            memcpy(sum, c + FOUR * (ALL - 1), sizeof sum);                                          \
-            for (i = ALL - 2; i >= FEW; --i) {                                                      \
-                for (l = 0; l < FOUR; ++l) {                                                        \
-                    sum[l] = c[FOUR * i + l] + by[i / TIMES] * sum[l];                              \
-                }                                                                                   \
-            }                                                                                       \
-            for (l = 0; l < FOUR; ++l) {                                                            \
-                last[first + l] = whole * sum[l];                                                   \
-            }                                                                                       \
-            for (i = FEW - 1; i >= 0; --i) {                                                        \
-                for (l = 0; l < FOUR; ++l) {                                                        \
-                    sum[l] = c[FOUR * i + l] + by[i / TIMES] * sum[l];                              \
-                }                                                                                   \
-            }                                                                                       \
-            memcpy(value + first, sum, sizeof sum);                                                 \
+        for (l = 0; l < PARTS; ++l) {                                                               \
+            ((TYPE *)(to + first))[l] = sum[l] + more[l];                                           \
         }                                                                                           \
     }
-NEWTON(KNOTS, 2, 2) /* without the last two terms: one knot less */
-NEWTON(TURNS, 3, 1) /* without the last one: a second derivative less */
+WEIGHED(1, double)
+WEIGHED(4, Quad)
+
+/* The same of n entries: four at a time, the last four perhaps again. */
+static APART void weighed(const Hermite *p, const double *a, const double *b, ptrdiff_t n, double *to)
+{
+    ptrdiff_t i = 0;
+    for (; i + FOUR <= n; i += FOUR) {
+        weighed_4(p, a, b, i, to);
+    }
+    if (i < n && n >= FOUR) {
+        weighed_4(p, a, b, n - FOUR, to);
+        return;
+    }
+    for (; i < n; ++i) {
+        weighed_1(p, a, b, i, to);
+    }
+}
+
+/*
+ * What `hermite_at` needs of places, values and slopes. A divided difference is a sum of residues: with all places twice that of f/prod_j
+ * (x - x_j)^2, in which 1/prod_(j != k) (x - x_j)^2 has at x_k the value W_k = scale_k^2 and the slope -2 s_k W_k; with the last place once, one
+ * factor (x_k - x_last) more.
+ */
+static void hermite(Hermite *p, ptrdiff_t n, double h)
+{
+    enum { LAST = KNOTS - 1 };
+    double a[KNOTS], b[KNOTS];
+    int k, j;
+    for (k = 0; k < KNOTS; ++k) {
+        p->steep[k] = 0.0;
+        p->scale[k] = 1.0;
+    }
+    for (k = 1; k < KNOTS; ++k) {
+        for (j = 0; j < k; ++j) {
+            const double over = 1.0 / (p->place[k] - p->place[j]);
+            p->steep[k] += over;
+            p->steep[j] -= over;
+            p->scale[k] *= over;
+            p->scale[j] *= -over;
+        }
+    }
+    for (k = 0; k < KNOTS; ++k) {
+        const double W = p->scale[k] * p->scale[k];
+        a[k] = -2.0 * p->steep[k] * W;
+        b[k] = h * W;
+    }
+    weighed(p, a, b, n, p->last);
+    for (k = 0; k < KNOTS; ++k) {
+        const double apart = p->place[k] - p->place[LAST], W = p->scale[k] * p->scale[k];
+        a[k] = apart * a[k] + W;
+        b[k] *= apart;
+    }
+    weighed(p, a, b, n, p->before);
+}
+
+/* The value at x, and in `left` what the last two terms of Newton's form add to it: without them there is one knot less. */
+static APART void hermite_at(const Hermite *p, ptrdiff_t n, double h, double x, double *value, double *left)
+{
+    double away[KNOTS], others[KNOTS], a[KNOTS], b[KNOTS], low = 1.0, high = 1.0, few = 1.0;
+    int k;
+    for (k = 0; k < KNOTS; ++k) {
+        away[k] = x - p->place[k];
+        others[k] = low * p->scale[k];
+        few = low; /* in the end without the last place */
+        low *= away[k];
+    }
+    for (k = KNOTS - 1; k >= 0; --k) {
+        const double l = others[k] * high, square = l * l;
+        high *= away[k];
+        a[k] = square * (1.0 - 2.0 * p->steep[k] * away[k]);
+        b[k] = h * square * away[k];
+    }
+    weighed(p, a, b, n, value);
+    for (ptrdiff_t i = 0; i < n; ++i) {
+        left[i] = few * few * (p->before[i] + away[KNOTS - 1] * p->last[i]);
+    }
+}
+
+/*
+ * Newton's polynomial of n entries of which the values and two derivatives are known at each of TURNS places, in lengths h: `newton` makes
+ * the coefficients, four entries a node, for registers; those behind the last entry are zeros. `newton_at` gives its value at x, and in
+ * `last` what the last term adds to it: both with room for whole fours. Loops of known length, which the compiler unrolls.
+ */
+static void newton(ptrdiff_t n, const double *place, const Jet *jets, double h, double *to)
+{
+    enum { ALL = TURN_NODES };
+    const double scale[3] = {1.0, h, 0.5 * h * h};
+    double over[TURNS][TURNS];
+    ptrdiff_t first;
+    int i, j, k, l;
+    for (i = 0; i < TURNS; ++i) {
+        for (j = 0; j < i; ++j) {
+            over[i][j] = 1.0 / (place[i] - place[j]);
+        }
+    }
+    for (first = 0; first < n; first += FOUR, to += FOUR * ALL) {
+        const int wide = n - first < FOUR ? (int)(n - first) : FOUR;
+        double known[ALL][FOUR] = {{0.0}}, c[ALL][FOUR]; /* of a place its derivatives over the factorials */
+        for (k = 0; k < ALL; ++k) {
+            for (l = 0; l < wide; ++l) {
+                known[k][l] = scale[k % 3] * jets[k / 3].of[k % 3][first + l];
+            }
+        }
+        for (k = 0; k < ALL; ++k) {
+            memcpy(c[k], known[k - k % 3], sizeof c[k]);
+        }
+        for (j = 1; j < ALL; ++j) {
+            for (i = ALL - 1; i >= j; --i) {
+                if (i % 3 >= j) { /* the node and that j before it are one place */
+                    memcpy(c[i], known[i - i % 3 + j], sizeof c[i]);
+                } else {
+                    const double by = over[i / 3][(i - j) / 3];
+                    for (l = 0; l < FOUR; ++l) {
+                        c[i][l] = by * (c[i][l] - c[i - 1][l]);
+                    }
+                }
+            }
+        }
+        memcpy(to, c, sizeof c);
+    }
+}
+
+static void newton_at(ptrdiff_t n, const double *place, const double *c, double x, double *value, double *last)
+{
+    enum { ALL = TURN_NODES, FEW = ALL - 1 };
+    double by[TURNS], whole = 1.0;
+    ptrdiff_t first;
+    int i, l;
+    for (i = 0; i < TURNS; ++i) {
+        by[i] = x - place[i];
+    }
+    for (i = 0; i < FEW; ++i) {
+        whole *= by[i / 3];
+    }
+    for (first = 0; first < n; first += FOUR, c += FOUR * ALL) {
+        double sum[FOUR];
+        memcpy(sum, c + FOUR * (ALL - 1), sizeof sum);
+        for (i = ALL - 2; i >= FEW; --i) {
+            for (l = 0; l < FOUR; ++l) {
+                sum[l] = c[FOUR * i + l] + by[i / 3] * sum[l];
+            }
+        }
+        for (l = 0; l < FOUR; ++l) {
+            last[first + l] = whole * sum[l];
+        }
+        for (i = FEW - 1; i >= 0; --i) {
+            for (l = 0; l < FOUR; ++l) {
+                sum[l] = c[FOUR * i + l] + by[i / 3] * sum[l];
+            }
+        }
+        memcpy(value + first, sum, sizeof sum);
+    }
+}
 
 #endif

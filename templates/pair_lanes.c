@@ -4,6 +4,8 @@
  * A lane takes one member from its start to the last time with steps of its own, and then the next that waits: what a member comes to
  * does not depend on its neighbours. All that is in work is kept as the kernels take it, entry i of lane l at 8 i + l:
  *     rate(X_0, y, t, numbers...) -> y'        move(X_0, Theta) -> X_0 exp(Theta)
+ * or, where y begins with the elements,
+ *     rate(y, t, numbers...) -> y'             move(y) -> X, lift(X) -> the elements of y: of one member
  * A step that would pass a wanted time ends there: it costs what a step of its own to that time would, and goes on from it.
  */
 #include <math.h>
@@ -13,20 +15,13 @@
 #include "pair_control.h"
 #include "pair_step.h"
 
-/* gcc makes vectors of a loop in a function of its own; within other loops it unrolls it first. */
-#if defined(__GNUC__)
-#define APART __attribute__((noinline))
-#else
-#define APART
-#endif
-
 enum { WIDE = 8, PARTS = WIDE * sizeof(double) / sizeof(PairVector) };
 
-typedef void (*Block)(const double *const *in, double *const *out);
+typedef void (*Block)(const double *const *in, double *const *out); /* of eight members at once, or of one */
 
 typedef struct {
-    Block rate, move;
-    ptrdiff_t members, packed, group, size, numbers;
+    Block rate, move, lift;                       /* lift: NULL if y begins with Theta */
+    ptrdiff_t members, packed, group, front, quaternions, size, numbers;
     const double *const *number;                  /* inputs of the rate beside X, y and t */
     const ptrdiff_t *number_stride, *number_size; /* in doubles, from member to member (0: all have the same), and of one */
     double rtol, atol, reach;                     /* |Theta| stays within reach */
@@ -45,7 +40,7 @@ typedef struct {
 
 typedef struct {
     double *X, *y, *after, *moved, *k, *five, *three, *size, *number;
-} Room;
+} Room; /* with elements in y, X and moved hold a member's state */
 
 static Room room_of(const Lanes *p)
 {
@@ -78,13 +73,37 @@ static void get(double *to, ptrdiff_t lane, const double *from, ptrdiff_t size)
     }
 }
 
+/* q <- q/|q| in all lanes of y. */
+static APART void unit(const Lanes *p, double *y)
+{
+    for (ptrdiff_t k = 0; k < p->quaternions; ++k) {
+        double *q = y + 4 * WIDE * k;
+        for (int l = 0; l < WIDE; ++l) {
+            const double a = q[l], b = q[WIDE + l], c = q[2 * WIDE + l], d = q[3 * WIDE + l];
+            const double square = a * a + b * b + c * c + d * d, by = square > 0.0 ? 1.0 / sqrt(square) : 0.0;
+            q[l] = by * a;
+            q[WIDE + l] = by * b;
+            q[2 * WIDE + l] = by * c;
+            q[3 * WIDE + l] = by * d;
+        }
+    }
+}
+
 /* A member at its start into a lane. */
 static void enter(Lanes *p, ptrdiff_t lane, ptrdiff_t member)
 {
     const Room room = room_of(p);
     double *number = room.number;
-    put(room.X, lane, p->X + member * p->packed, p->packed);
     put(room.y, lane, p->y + member * p->size, p->size);
+    if (p->lift) {
+        const double *in[1] = {p->X + member * p->packed};
+        double *out[1] = {room.moved};
+        p->lift(in, out);
+        put(room.y, lane, room.moved, p->front);
+        unit(p, room.y);
+    } else {
+        put(room.X, lane, p->X + member * p->packed, p->packed);
+    }
     for (ptrdiff_t k = 0; k < p->numbers; ++k) {
         put(number, lane, p->number[k] + member * p->number_stride[k], p->number_size[k]);
         number += WIDE * p->number_size[k];
@@ -106,12 +125,15 @@ static void rates(Lanes *p, const double *y, const double *t, double *to)
     const Room room = room_of(p);
     const double *in[3 + MOST_NUMBERS], *number = room.number;
     double *out[1];
-    in[0] = room.X;
-    in[1] = y;
-    in[2] = t;
+    int first = 0;
+    if (!p->lift) {
+        in[first++] = room.X;
+    }
+    in[first++] = y;
+    in[first++] = t;
     out[0] = to;
     for (ptrdiff_t k = 0; k < p->numbers; ++k) {
-        in[3 + k] = number;
+        in[first + k] = number;
         number += WIDE * p->number_size[k];
     }
     ++p->evaluations;
@@ -151,15 +173,19 @@ static double cut(const Lanes *p, int l, int *ends)
     return *ends ? gap : gap < 1.9 * h ? 0.5 * gap : h; /* not a step and a crumb */
 }
 
-/* Squares of entries over what is allowed; of entries of Theta, which are those of X, the size is one. */
+/* Squares of entries over what is allowed; of entries of Theta, which are those of X, the size is one, of elements at least one. */
 static APART void weigh(const Lanes *p)
 {
     const Room room = room_of(p);
-    const ptrdiff_t angles = WIDE * p->group, all = WIDE * p->size;
+    const ptrdiff_t angles = WIDE * p->group, elements = WIDE * p->front, all = WIDE * p->size;
     for (ptrdiff_t at = 0; at < angles; ++at) {
         room.size[at] = 1.0 / (p->atol + p->rtol);
     }
-    for (ptrdiff_t at = angles; at < all; ++at) {
+    for (ptrdiff_t at = angles; at < elements; ++at) {
+        const double a = fabs(room.y[at]), b = fabs(room.after[at]), c = a > b ? a : b;
+        room.size[at] = 1.0 / (p->atol + p->rtol * (c > 1.0 ? c : 1.0));
+    }
+    for (ptrdiff_t at = elements; at < all; ++at) {
         const double a = fabs(room.y[at]), b = fabs(room.after[at]);
         room.size[at] = 1.0 / (p->atol + p->rtol * (a > b ? a : b));
     }
@@ -197,7 +223,7 @@ static APART void judge(const Lanes *p, double *error, double *angle, double *gr
         error[l] = pair_error(((const double *)five)[l], ((const double *)three)[l], 1.0, p->size);
     }
     for (int l = 0; l < WIDE; ++l) {
-        growth[l] = 0.9 / sqrt(sqrt(sqrt(error[l])));
+        growth[l] = longer(error[l]);
     }
 }
 
@@ -226,8 +252,14 @@ static void go_on(Lanes *p, int l, double h, double growth, int ends)
     p->h[l] = next_length(h, p->h[l], growth);
     if (ends) {
         const ptrdiff_t at = p->next[l] * p->row + p->member[l];
-        get(p->X_out + at * p->packed, l, room.X, p->packed);
         get(p->y_out + at * p->size, l, room.y, p->size);
+        if (p->lift) {
+            const double *in[1] = {p->y_out + at * p->size};
+            double *out[1] = {p->X_out + at * p->packed};
+            p->move(in, out);
+        } else {
+            get(p->X_out + at * p->packed, l, room.X, p->packed);
+        }
         p->t[l] = p->times[++p->next[l]];
         p->t_low[l] = 0.0;
         p->member[l] = p->next[l] < p->count ? p->member[l] : -1;
@@ -236,20 +268,28 @@ static void go_on(Lanes *p, int l, double h, double growth, int ends)
     }
 }
 
-/* The state behind the steps of the lanes that `take` it, or of all: X exp(Theta); Theta in y stays 0. */
+/* The state behind the steps of the lanes that `take` it, or of all: X exp(Theta); Theta in y stays 0. Or q/|q|. */
 static void settle(Lanes *p, const int *take, int all)
 {
     const Room room = room_of(p);
     const double *in[2] = {room.X, room.after};
     double *out[1] = {room.moved};
-    p->move(in, out);
+    if (p->lift) {
+        unit(p, room.after);
+    } else {
+        p->move(in, out);
+    }
+    if (all && p->lift) {
+        memcpy(room.y, room.after, (size_t)(WIDE * p->size) * sizeof(double));
+        return;
+    }
     if (all) {
         memcpy(room.X, room.moved, (size_t)(WIDE * p->packed) * sizeof(double));
         memcpy(room.y + WIDE * p->group, room.after + WIDE * p->group, (size_t)(WIDE * (p->size - p->group)) * sizeof(double));
         return;
     }
     for (int l = 0; l < WIDE; ++l) {
-        for (ptrdiff_t i = 0; take[l] && i < p->packed; ++i) {
+        for (ptrdiff_t i = 0; take[l] && !p->lift && i < p->packed; ++i) {
             room.X[WIDE * i + l] = room.moved[WIDE * i + l];
         }
         for (ptrdiff_t i = p->group; take[l] && i < p->size; ++i) {

@@ -54,6 +54,39 @@ PAIR_SUM(4, double)
 PAIR_SUM(8, PairVector)
 PAIR_SUM(16, PairVector)
 
+/* gcc makes vectors of a loop in a function of its own; within other loops it unrolls it first, and a long one it copies to all who call it. */
+#if defined(__GNUC__)
+#define APART __attribute__((noinline))
+#else
+#define APART
+#endif
+
+/* The state at which stage s of a step of length h from y asks for its slope, or behind the last one the state after the step: n doubles. */
+static APART void pair_stage(int s, ptrdiff_t n, const double *y, double h, const double *k, double *to)
+{
+    const double *a = s < STAGES ? A[s] : B;
+    const unsigned char *used = USED[s];
+    const int count = USES[s];
+    ptrdiff_t i = 0;
+    for (; i + 16 <= n; i += 16) {
+        pair_sum_16(a, used, count, n, k + i, y + i, h, to + i);
+    }
+    for (; i + 8 <= n; i += 8) {
+        pair_sum_8(a, used, count, n, k + i, y + i, h, to + i);
+    }
+    if (i + 4 <= n) {
+        pair_sum_4(a, used, count, n, k + i, y + i, h, to + i);
+        i += 4;
+    }
+    if (i + 2 <= n) {
+        pair_sum_2(a, used, count, n, k + i, y + i, h, to + i);
+        i += 2;
+    }
+    if (i < n) {
+        pair_sum_1(a, used, count, n, k + i, y + i, h, to + i);
+    }
+}
+
 /*
  * The slopes k_2 .. k_12 of a step of length h from (t, y), k_1 being known, and the state after it: n doubles each. `stage` may be
  * `after`.
@@ -61,33 +94,13 @@ PAIR_SUM(16, PairVector)
 static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const double *y, double h, double *k, double *stage, double *after)
 {
     int s;
-    for (s = 1; s <= STAGES; ++s) {
-        const double *a = s < STAGES ? A[s] : B;
-        const unsigned char *used = USED[s];
-        const int count = USES[s];
-        double *to = s < STAGES ? stage : after;
-        ptrdiff_t i = 0;
-        for (; i + 16 <= n; i += 16) {
-            pair_sum_16(a, used, count, n, k + i, y + i, h, to + i);
-        }
-        for (; i + 8 <= n; i += 8) {
-            pair_sum_8(a, used, count, n, k + i, y + i, h, to + i);
-        }
-        if (i + 4 <= n) {
-            pair_sum_4(a, used, count, n, k + i, y + i, h, to + i);
-            i += 4;
-        }
-        if (i + 2 <= n) {
-            pair_sum_2(a, used, count, n, k + i, y + i, h, to + i);
-            i += 2;
-        }
-        if (i < n) {
-            pair_sum_1(a, used, count, n, k + i, y + i, h, to + i);
-        }
-        if (s < STAGES && slope(who, t + C[s] * h, stage, k + s * n)) {
+    for (s = 1; s < STAGES; ++s) {
+        pair_stage(s, n, y, h, k, stage);
+        if (slope(who, t + C[s] * h, stage, k + s * n)) {
             return 1;
         }
     }
+    pair_stage(STAGES, n, y, h, k, after);
     return 0;
 }
 
@@ -118,7 +131,7 @@ PAIR_ERRORS(2, double)
 PAIR_ERRORS(8, PairVector)
 
 /* The two error estimates of all n entries. */
-static void pair_errors(const double *k, ptrdiff_t n, double *five, double *three)
+static APART void pair_errors(const double *k, ptrdiff_t n, double *five, double *three)
 {
     ptrdiff_t i = 0;
     for (; i + 8 <= n; i += 8) {

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_model import Loop
-from lie_codegen.control.loop_rate import columns, moves_of
+from lie_codegen.control.loop_rate import columns, moves_of, short_of
 from lie_codegen.control.loop_run import Run
 from lie_codegen.control.plants import GroupPlant
 from lie_codegen.errors import InputError
@@ -28,7 +29,13 @@ _ROUNDING = 1e-15
 
 def loop_system(loop: Loop, library: Library, numbers: Mapping[str, Array]) -> System:
     """The loop as the pair integrates it."""
-    moves = moves_of(loop)
+    moves, short = moves_of(loop), short_of(loop)
+    if short is not None:
+        numbers_of = tuple(numbers[port.name] for port in library.loop_rate.inputs[2:])
+        return System(
+            library.loop_rate, library.loop_settle, short.size, inf, numbers_of, steady=loop.steady,
+            lift=library.loop_lift, quaternions=short.quaternions,
+        )  # fmt: skip
     reach = min(reach_of(move.group, closed=move.derivation.closed_exponential) for move in moves)
     turns = sum(move.group.dim for move in moves)
     given = tuple(numbers[port.name] for port in library.loop_rate.inputs[3:])

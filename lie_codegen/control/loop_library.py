@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.control.loop_kernels import loop_control, loop_motion, loop_outputs, loop_sample, loop_step
 from lie_codegen.control.loop_model import SIGMAS, Loop, loop_model
-from lie_codegen.control.loop_rate import has_rate, loop_rate, loop_settle
+from lie_codegen.control.loop_rate import has_rate, pair_kernels
 from lie_codegen.control.positive_batch import clear_inverses
 from lie_codegen.control.reference_kernels import motion_kernel
 from lie_codegen.errors import InputError, NotFiniteError, ShapeError
@@ -59,11 +59,13 @@ def _made(loop: Mapping[str, Any], reference: Any, kind: str) -> tuple[Loop, Lib
     adaptive = kind == "adaptive" and has_rate(model)
     kernels: list[Kernel] = [make(model) for make in KINDS["continuous" if kind == "adaptive" else kind]]
     if adaptive:
-        kernels = [loop_rate(model, reference), loop_settle(model)]
+        kernels = pair_kernels(model, reference)
     kernels += [loop_outputs(model)] if model.law is not None else []
     if reference is not None:
         kernels.append(motion_kernel(reference))
-    library = build_kernels(lambda: kernels, namespace=model.plant.namespace, definition=defined_together(kernels))
+    library = build_kernels(
+        lambda: kernels, namespace=model.plant.namespace, definition=defined_together(kernels), fused=adaptive
+    )
     return model, library
 
 

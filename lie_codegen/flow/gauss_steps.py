@@ -35,6 +35,7 @@ def gauss(system: System, X0: Array, y0: Array, times: Array, parts: int, where:
     given.h, given.work = h, work.ctypes.data
     given.X, given.y = X.ctypes.data, y.ctypes.data
     library = compiled_pair()
+    library.pair_lift(ctypes.addressof(given))
     block = max(1, _BLOCK // parts)
     for first in range(0, k - 1, block):
         spans = min(block, k - 1 - first)

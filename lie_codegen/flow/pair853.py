@@ -36,9 +36,10 @@ _SHORTER = _RATIO ** (-1 / 8)
 _COMPARED = 8
 #: An interpolated state may err so many times more than a step: once, where the errors of steps add up.
 _BETWEEN = 2.0
-#: Where steps go as they like the first run of a member has local errors of this part of the tolerance: of hundred loops on SO(3) and SE(3)
-#: at 1e-5 to 1e-12 nine needed a third run with 1, none with 1/4, for a tenth more steps.
-_FREE_SHARE = 0.25
+#: Where steps go as they like the first run of a member has local errors of this part of the tolerance, by Theta and by elements: of hundred
+#: loops on SO(3) and SE(3) at 1e-5 to 1e-12 nine needed a third run with 1, none with 1/4, for a tenth more steps; by elements of
+#: three hundred on SO(3) four with 1/4, none with 1/8, for a fifteenth more.
+_FREE_SHARE, _FREE_SHARE_SHORT = 0.25, 0.125
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
@@ -70,6 +71,8 @@ class PairRun:
 
     def within(self, system: System, knots: NDArray[np.intp], parts: Array) -> tuple[Array, Array]:
         """X and y the fractions `parts` of the way through the steps `knots`, by fresh steps of a single member."""
+        if self.knot_X.shape[1] != system.kept:  # from a file of before states were kept as elements
+            return self._lifted(system).within(system, knots, parts)
         at = np.ascontiguousarray(knots, dtype=np.intp)
         part = np.ascontiguousarray(parts, dtype=float)
         X, y = np.empty((len(at), system.packed)), np.empty((len(at), system.size))
@@ -82,6 +85,13 @@ class PairRun:
             ctypes.addressof(given), len(at), at.ctypes.data, part.ctypes.data, X.ctypes.data, y.ctypes.data
         )
         return X, y
+
+    def _lifted(self, system: System) -> PairRun:
+        """The same with the elements of the knots in y instead of Theta = 0 and X beside it."""
+        lift, vectors = system.lift, system.size - system.group
+        behind = self.knot_y[:, self.knot_y.shape[1] - vectors :]
+        elements = np.array([lift(X) for X in self.knot_X]) if lift is not None else self.knot_y[:, :0]
+        return replace(self, knot_X=self.knot_X[:, :0], knot_y=np.concatenate([elements, behind], axis=1))
 
     def at(self, system: System, times: Array) -> tuple[Array, Array]:
         """X and y at times within the run of a single member."""
@@ -128,8 +138,8 @@ def _to_tolerance(
     # The error of a run is in proportion to its local tolerance: of two whose tolerances differ by a factor r the
     # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
     one = len(X0) == 1
-    free = one and system.algebra is not None and len(times) > 2  # steps go as they like, and all times cost little
-    share = _FREE_SHARE if free else 1.0
+    free = one and system.is_interpolated and len(times) > 2  # steps go as they like, and all times cost little
+    share = (_FREE_SHARE if system.lift is None else _FREE_SHARE_SHORT) if free else 1.0
     # the last time and those a whole number of places before it, but for the first
     apart = -(-(len(times) - 1) // _COMPARED) if one and system.steady and not free else 1
     compared = slice((len(times) - 1) % apart or apart, None, apart)
@@ -225,9 +235,9 @@ def _many(
 
 def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
     """One run of a single member, with its knots."""
-    packed, size, group, k = system.packed, system.size, system.group, len(times)
+    packed, size, k = system.packed, system.size, len(times)
     # a system that can be interpolated steps to its end, and the states between come afterwards
-    between = system.algebra is not None and k > 2
+    between = system.is_interpolated and k > 2
     given = system.record()
     X_out, y_out = np.empty((k, 1, packed)), np.empty((k, 1, size))
     X_out[0], y_out[0] = X0, y0
@@ -247,7 +257,9 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
     given.X_out, given.y_out = wanted[2] + 8 * packed * ahead, wanted[3] + 8 * size * ahead
     knots: list[tuple[Array, ...]] = []
     library, status, room = compiled_pair(), FULL, min(_FIRST_STEPS, _STEPS)
-    widths = (1, 1, packed, size, size, group) if between else (1, 1, packed, size)
+    library.pair_lift(ctypes.addressof(given))
+    widths: tuple[int, ...] = (1, 1, system.kept, size)
+    widths = (*widths, size, system.turns) if between else widths
     while status == FULL:
         rows = np.empty((room + 1) * sum(widths))  # a row more: the end
         first, given.room = rows.ctypes.data, room
@@ -281,34 +293,38 @@ def _twice(
         The second run, its largest difference to the first, its size, the steps of the first; None where one of them needs more
         than the first room for knots, or fails: `_once` says how.
     """
-    packed, size, group, k = system.packed, system.size, system.group, len(times)
+    packed, size, kept, k = system.packed, system.size, system.kept, len(times)
     state, rows = packed + size, _FIRST_STEPS + 1
     given = system.record()
-    # behind each other: the start, found, tolerances; state and times; the states of the first run; what steps and interpolation work
-    # with; knots by columns
-    sizes = (
-        state, 4, 5, packed, size, k - 1, (k - 1) * state, system.work_size, system.between_size,
-        rows, rows, rows * packed, rows * size, rows * size, rows * group,
+    # behind each other: the start, tolerances, found, times, the states of the run with longer steps; then of each of the two runs where it is,
+    # what steps and interpolation work with, knots by columns
+    common = (state, 5, 5, k - 1, (k - 1) * state)
+    own = (
+        packed, size, system.work_size, system.between_size, rows, rows, rows * kept, rows * size, rows * size,
+        rows * system.turns,
     )  # fmt: skip
-    places = [0, *accumulate(sizes)]
-    block, X, y = np.empty(places[-1]), np.empty((k, 1, packed)), np.empty((k, 1, size))
-    block[:packed], block[packed:state], block[places[2] : places[3]] = X0[0], y0[0], tolerances
-    block[places[5] : places[6]] = times[1:]
+    apart, places = sum(own), [0, *accumulate((*common, *own))]
+    block, X, y = np.empty(places[-1] + apart), np.empty((k, 1, packed)), np.empty((k, 1, size))
+    block[:packed], block[packed:state], block[state : state + 5] = X0[0], y0[0], tolerances
+    block[places[3] : places[4]] = times[1:]
     X[0], y[0] = X0, y0
     at = block.ctypes.data
-    start, found, asked, given.X, given.y, given.times, first, given.work, given.dense, *knots = [
+    start, asked, found, given.times, other, given.X, given.y, given.work, given.dense, *knots = [
         at + 8 * place for place in places[:-1]
     ]
     given.knot_t, given.knot_h, given.knot_X, given.knot_y, given.knot_slope, given.knot_theta = knots
     given.t, given.longest, given.count = times[0], times[-1] - times[0], k - 1
     given.room = _FIRST_STEPS
     given.X_out, given.y_out = X.ctypes.data + 8 * packed, y.ctypes.data + 8 * size
-    if compiled_pair().pair_twice(ctypes.addressof(given), start, asked, _FIRST_STEPS, _BETWEEN, first, found) != DONE:
+    status = compiled_pair().pair_twice(
+        ctypes.addressof(given), start, asked, _FIRST_STEPS, _BETWEEN, apart, other, found
+    )
+    if status != DONE:
         return None
-    off_X, off_y, largest, coarse = block[places[1] : places[2]].tolist()
-    knots_kept = _rows(block[places[9] :], rows, given.steps, (1, 1, packed, size))
+    off_X, off_y, size_X, size_y, coarse = block[places[2] : places[3]].tolist()
+    knots_kept = _rows(block[places[9] :], rows, given.steps, (1, 1, kept, size))
     run = PairRun(X, y, given.steps, given.rejected, given.evaluations, nan, *knots_kept)
-    return run, max(off_X, off_y), largest, int(coarse)
+    return run, max(off_X, off_y), max(size_X, size_y), int(coarse)
 
 
 def _rows(rows: Array, room: int, count: int, widths: tuple[int, ...]) -> tuple[Array, ...]:
@@ -322,4 +338,4 @@ def _rows(rows: Array, room: int, count: int, widths: tuple[int, ...]) -> tuple[
 
 
 def _no_knots(system: System) -> tuple[Array, Array, Array, Array]:
-    return np.empty(0), np.empty(0), np.empty((0, system.packed)), np.empty((0, system.size))
+    return np.empty(0), np.empty(0), np.empty((0, system.kept)), np.empty((0, system.size))

@@ -27,8 +27,8 @@ class Lanes(ctypes.Structure):
     """`Lanes` of templates/pair_lanes.c."""
 
     _fields_ = [
-        *((n, ctypes.c_void_p) for n in ("rate", "move")),
-        *((n, ctypes.c_ssize_t) for n in ("members", "packed", "group", "size", "numbers")),
+        *((n, ctypes.c_void_p) for n in ("rate", "move", "lift")),
+        *((n, ctypes.c_ssize_t) for n in ("members", "packed", "group", "front", "quaternions", "size", "numbers")),
         *((n, ctypes.c_void_p) for n in ("number", "number_stride", "number_size")),
         *((n, ctypes.c_double) for n in ("rtol", "atol", "reach")),
         *((n, ctypes.c_void_p) for n in ("X", "y", "times")),
@@ -86,12 +86,13 @@ def run_lanes(
     X, y = (np.ascontiguousarray(each) for each in start)
     at = np.ascontiguousarray(times)
     numbers, strides = system.members_numbers()
-    sizes = [port.size for port in system.rate.inputs[3:]]
+    sizes = [port.size for port in system.number_ports]
     pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(each.ctypes.data for each in numbers))
     moves, wide = ((ctypes.c_ssize_t * max(1, len(numbers)))(*each) for each in (strides, sizes))
     work = np.zeros(WIDE * (2 * system.packed + (5 + STAGES) * system.size + sum(sizes)))
     given = Lanes(
-        *system.blocks, len(X), system.packed, system.group, system.size, len(numbers),
+        *system.blocks, system.lifting, len(X), system.packed, system.turns, system.group, system.quaternions, system.size,
+        len(numbers),
         ctypes.addressof(pointers), ctypes.addressof(moves), ctypes.addressof(wide),
         rtol, atol, system.reach, X.ctypes.data, y.ctypes.data, at.ctypes.data, len(at) - 1, out[0].shape[1],
         out[0].ctypes.data + 8 * first * system.packed, out[1].ctypes.data + 8 * first * system.size, work.ctypes.data, most,

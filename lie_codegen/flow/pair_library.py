@@ -41,15 +41,15 @@ class Pair(ctypes.Structure):
     """`struct pair` of templates/pair853.c."""
 
     _fields_ = [
-        *((n, ctypes.c_void_p) for n in ("rate", "move")),
-        *((n, ctypes.c_ssize_t) for n in ("packed", "group", "size", "numbers")), ("number", ctypes.c_void_p),
+        *((n, ctypes.c_void_p) for n in ("rate", "move", "lift")),
+        *((n, ctypes.c_ssize_t) for n in ("packed", "group", "front", "quaternions", "size", "numbers")), ("number", ctypes.c_void_p),
         *((n, ctypes.c_double) for n in ("t", "t_low", "h", "rtol", "atol", "reach", "longest")),
         *((n, ctypes.c_void_p) for n in ("X", "y", "times")),
         *((n, ctypes.c_ssize_t) for n in ("count", "next")),
         *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y", "knot_slope", "knot_theta")),
         *((n, ctypes.c_ssize_t) for n in ("room", "knots")), ("work", ctypes.c_void_p),
         *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations", "algebra", "brackets")),
-        *((n, ctypes.c_void_p) for n in ("bracket_index", "bracket_c", "dense")), ("between", ctypes.c_double),
+        *((n, ctypes.c_void_p) for n in ("bracket_index", "bracket_c", "dense")),
     ]  # fmt: skip
 
 
@@ -76,10 +76,11 @@ def pair_library() -> Any:
     library.gauss_run.restype, library.gauss_run.argtypes = size, (pointer, size, size)
     library.pair_twice.restype, library.pair_twice.argtypes = (
         size,
-        (pointer, pointer, pointer, size, ctypes.c_double, pointer, pointer),
+        (pointer, pointer, pointer, size, ctypes.c_double, size, pointer, pointer),
     )
     library.between_size.restype, library.between_size.argtypes = size, (size, size)
     library.pair_between.restype, library.pair_between.argtypes = None, (pointer, size, ctypes.c_double)
+    library.pair_lift.restype, library.pair_lift.argtypes = None, (pointer,)
     library.pair_within.restype, library.pair_within.argtypes = (
         None,
         (pointer, size, pointer, pointer, pointer, pointer),

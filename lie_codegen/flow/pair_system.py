@@ -1,4 +1,4 @@
-"""X' = X hat(xi), y' = F(t, X, y) as two compiled kernels, and as the C of templates/pair853.c reads them."""
+"""X' = X hat(xi), y' = F(t, X, y) as compiled kernels, and as the C of templates/pair853.c reads them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.arrays import Array
 from lie_codegen.flow.pair_library import STAGES, Pair, compiled_pair, pair_library
+from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.call import Compiled
 
 
@@ -21,15 +22,16 @@ class System:
     """What is integrated.
 
     Attributes:
-        rate: kernel (X packed, y, t, numbers...) -> y', y = (Theta, xi, ...).
-        move: kernel (X packed, Theta) -> X exp(Theta), packed.
-        group: n, entries of Theta.
+        rate: kernel (X packed, y, t, numbers...) -> y', y = (Theta, xi, ...); or (y, t, numbers...) -> y' where y holds the elements.
+        move: kernel (X packed, Theta) -> X exp(Theta), packed; or (elements of y) -> X packed.
+        group: entries of y in front, Theta or the elements.
         reach: |Theta| up to which a step may go.
         numbers: the other inputs of the rate in its order, of all members (*shape) or one each (N, *shape).
         steady: whether the rate is known not to read t. Another may change within a moment that only steps which end at all times
             that were asked for get past.
         algebra: of the group, where y begins (Theta, xi, ...) with X' = X hat(xi) and the rate is steady: then states between
-            steps are interpolated. None elsewhere.
+            steps are interpolated. None elsewhere. Of elements in y nothing is needed.
+        lift: kernel (X packed) -> elements of y, which begin with so many `quaternions`; None where y begins with Theta.
     """
 
     rate: Compiled[Any]
@@ -39,16 +41,38 @@ class System:
     numbers: tuple[Array, ...] = ()
     steady: bool = False
     algebra: LieAlgebra | None = None
+    lift: Compiled[Any] | None = None
+    quaternions: int = 0
 
     @cached_property
     def packed(self) -> int:
         """Doubles of X."""
-        return int(self.rate.inputs[0].size)
+        return int(self.move.outputs[0].size)
 
     @cached_property
     def size(self) -> int:
         """Doubles of y."""
-        return int(self.rate.inputs[1].size)
+        return int(self.rate.outputs[0].size)
+
+    @cached_property
+    def kept(self) -> int:
+        """Doubles of X that a knot keeps beside y."""
+        return self.packed if self.lift is None else 0
+
+    @cached_property
+    def turns(self) -> int:
+        """Doubles of Theta in y."""
+        return self.group if self.lift is None else 0
+
+    @cached_property
+    def is_interpolated(self) -> bool:
+        """Whether states between steps follow from knots."""
+        return self.algebra is not None if self.lift is None else self.steady
+
+    @cached_property
+    def number_ports(self) -> tuple[Port, ...]:
+        """Inputs of the rate beside X, y and t."""
+        return self.rate.inputs[3 if self.lift is None else 2 :]
 
     @cached_property
     def compiled(self) -> bool:
@@ -77,7 +101,7 @@ class System:
     @cached_property
     def between_size(self) -> int:
         """Doubles that interpolation works with."""
-        return int(compiled_pair().between_size(self.group, self.size))
+        return int(compiled_pair().between_size(self.turns, self.size))
 
     def work(self) -> Array:
         """Room for a step."""
@@ -90,8 +114,16 @@ class System:
 
     @cached_property
     def blocks(self) -> tuple[int, int]:
-        """Where those of eight members at once are, which are compiled when they are first asked for; 0 where they cannot be."""
-        return self.rate.backend.address(many=True), self.move.backend.address(many=True)
+        """Where those of eight members at once are, which are compiled when they are first asked for; 0 where they cannot be.
+
+        From elements to X it goes member by member.
+        """
+        return self.rate.backend.address(many=True), self.move.backend.address(many=self.lift is None)
+
+    @cached_property
+    def lifting(self) -> int:
+        """Where `lift` is; 0 where there is none."""
+        return 0 if self.lift is None else self.lift.backend.address(many=False)
 
     def members_numbers(self) -> tuple[list[Array], list[int]]:
         """The numbers as C reads them, and how far it is from one member to the next: 0 where all have the same."""
@@ -109,13 +141,14 @@ class System:
         pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(v.ctypes.data for v in numbers))
         given = Pair()
         given.rate, given.move = self._one
-        given.packed, given.group, given.size, given.reach = self.packed, self.group, self.size, self.reach
+        given.lift, given.front, given.quaternions = self.lifting, self.group, self.quaternions
+        given.packed, given.group, given.size, given.reach = self.packed, self.turns, self.size, self.reach
         given.numbers, given.number = len(numbers), ctypes.addressof(pointers)
         index, c = self.brackets
         given.algebra, given.brackets, given.bracket_index, given.bracket_c = (
-            self.group, len(c), index.ctypes.data, c.ctypes.data
+            self.turns, len(c), index.ctypes.data, c.ctypes.data
         )  # fmt: skip
         return given, (numbers, pointers, index, c)
 
     def _is_own(self, k: int) -> bool:
-        return bool(self.numbers[k].ndim > len(self.rate.inputs[3 + k].shape))
+        return bool(self.numbers[k].ndim > len(self.number_ports[k].shape))

@@ -1,6 +1,8 @@
 """A system on a product of groups and a vector space as the rate of one vector, for integrators that choose their steps.
 
 X_i' = X_i hat(xi_i(t, X, v)),   v' = a(t, X, v);   within a step X_i = X_i0 exp(Theta_i), y = (Theta_1, ..., Theta_m, v)
+
+or, on groups of rotations and free entries, with the elements themselves in y (`short_rate`).
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from lie_codegen.flow.near_identity import NearIdentity
+from lie_codegen.flow.short_state import ShortStates
 from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -84,6 +87,13 @@ def _largest(group: MatrixGroup) -> float:
 def _in_series(group: MatrixGroup) -> bool:
     """Whether a step stays where the series of exp are all of it."""
     return reach_of(group, closed=derivation_of(group).closed_exponential) * _largest(group) <= _SERIES_REACH
+
+
+def short_rate(ops: Arithmetic, states: ShortStates, y: Vector, rates: Rates, t: Scalar) -> Vector:
+    """y' of y = (the elements as unit quaternions and entries beside them, v); see `short_state`."""
+    elements = states.elements(y)
+    velocities, slope = rates(t, list(elements), list(y[states.size :]))
+    return [*states.rates(ops, y, elements, velocities), *slope]
 
 
 def product_rate(

@@ -38,6 +38,7 @@ def build_kernels(
     definition: str | None = None,
     options: Mapping[str, Any] | None = None,
     real: str = "double",
+    fused: bool = False,
 ) -> Library:
     """The kernels as a library of callables.
 
@@ -48,6 +49,8 @@ def build_kernels(
             come from elsewhere.
         options: plain data that `make_kernels` depends on beside the definition.
         real: "double", or "float": what the library computes in, takes and gives.
+        fused: whether multiplications and additions may become one operation: for kernels whose bits nobody compares with the interpreter's,
+            as rates that an integrator calls.
 
     Raises:
         CodegenError: a kernel cannot become C.
@@ -67,7 +70,9 @@ def build_kernels(
 
     if real != "double":
         options = {**(options or {}), "real": real}
-    return build_sources(make_sources, compilers, namespace=namespace, definition=definition, options=options)
+    return build_sources(
+        make_sources, compilers, namespace=namespace, definition=definition, options=options, fused=fused
+    )
 
 
 def build_sources(
@@ -77,6 +82,7 @@ def build_sources(
     namespace: str | None = None,
     definition: str | None = None,
     options: Mapping[str, Any] | None = None,
+    fused: bool = False,
 ) -> Library:
     """As `build_kernels`, from what makes the C text; some compiler is there.
 
@@ -87,7 +93,7 @@ def build_sources(
     prepare_extension()
     requests = []
     if definition is not None:
-        requests = [_request(namespace, definition, options or {}, compiler) for compiler in compilers]
+        requests = [_request(namespace, definition, options or {}, compiler, fused) for compiler in compilers]
         for request in requests:
             entry = cache.find_request(folder, request)
             if entry is not None and (library := _open_or_none(entry)) is not None:
@@ -95,7 +101,7 @@ def build_sources(
     with progress("build"):
         sources = make_sources()
         check_names(sources.signatures)
-        return _compile(folder, sources, compilers, requests)
+        return _compile(folder, sources, compilers, requests, fused)
 
 
 def interpreted(kernels: Sequence[Kernel], *, namespace: str | None = None, real: str = "double") -> Library:
@@ -130,12 +136,17 @@ def _namespace(given: str | None, kernels: Sequence[Kernel]) -> str:
     return kernels[0].namespace if given is None else given
 
 
-def _request(namespace: str | None, definition: str, options: Mapping[str, Any], compiler: Compiler) -> str:
-    return request_key(compiler, flags_for(0), namespace=namespace, definition=definition, options=dict(options))
+def _request(
+    namespace: str | None, definition: str, options: Mapping[str, Any], compiler: Compiler, fused: bool
+) -> str:
+    flags = flags_for(0, fused=fused)
+    return request_key(compiler, flags, namespace=namespace, definition=definition, options=dict(options))
 
 
-def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler], requests: Sequence[str]) -> Library:
-    flags, over_lanes = flags_for(sources.statements), lane_flags(sources.statements)
+def _compile(
+    folder: Path, sources: LibrarySources, compilers: Sequence[Compiler], requests: Sequence[str], fused: bool
+) -> Library:
+    flags, over_lanes = flags_for(sources.statements, fused=fused), lane_flags(sources.statements, fused=fused)
 
     def attempt(folder: Path, number: int, compiler: Compiler) -> cache.Entry:
         # The C text itself is the key: another request for the same text, from another version, compiles nothing.
@@ -149,7 +160,7 @@ def _compile(folder: Path, sources: LibrarySources, compilers: Sequence[Compiler
             }
         )
         with cache.lock(folder, key):
-            entry = cache.find_entry(folder, key) or _fill(folder, key, sources, compiler, flags)
+            entry = cache.find_entry(folder, key) or _fill(folder, key, sources, compiler, flags, over_lanes)
             if requests:
                 cache.store_request(folder, requests[number], key)
         return entry
@@ -169,7 +180,14 @@ def _opened_somewhere(folder: Path, compilers: Sequence[Compiler], attempt: Atte
     return _open(compiled_entry(usable_folder(), compilers, attempt))
 
 
-def _fill(folder: Path, key: str, sources: LibrarySources, compiler: Compiler, flags: tuple[str, ...]) -> cache.Entry:
+def _fill(
+    folder: Path,
+    key: str,
+    sources: LibrarySources,
+    compiler: Compiler,
+    flags: tuple[str, ...],
+    over_lanes: tuple[str, ...],
+) -> cache.Entry:
     one_lane = (*flags, ONE_LANE)
     entry = compile_entry(
         folder,
@@ -182,7 +200,7 @@ def _fill(folder: Path, key: str, sources: LibrarySources, compiler: Compiler, f
         sources.signatures,
         sources.notes,
     )
-    keep_sources(entry, sources.files, sources.main, lane_flags(sources.statements), compiler)
+    keep_sources(entry, sources.files, sources.main, over_lanes, compiler)
     return entry
 
 

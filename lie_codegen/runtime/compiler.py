@@ -122,15 +122,16 @@ def warn_passed_over(command: str, why: str) -> None:
     warn_caller(f"the C compiler {command!r} is passed over, {why}; the next is tried", CompilerWarning)
 
 
-def flags_for(statements: int) -> tuple[str, ...]:
-    """The flags for a unit whose longest kernel has that many statements."""
-    return ("-O1" if statements > LARGE else "-O2", NATIVE, *FLAGS)
+def flags_for(statements: int, *, fused: bool = False) -> tuple[str, ...]:
+    """The flags for a unit whose longest kernel has that many statements; `fused`: multiplications and additions may become one."""
+    contraction = ("-ffp-contract=fast",) if fused else ()
+    return ("-O1" if statements > LARGE else "-O2", NATIVE, *FLAGS, *contraction)
 
 
-def lane_flags(statements: int) -> tuple[str, ...]:
+def lane_flags(statements: int, *, fused: bool = False) -> tuple[str, ...]:
     """The flags for the lanes of such a unit."""
     least, most = SCHEDULED
-    return (*flags_for(statements), *([_SCHEDULING] if least <= statements <= most else []))
+    return (*flags_for(statements, fused=fused), *([_SCHEDULING] if least <= statements <= most else []))
 
 
 def compile_library(compiler: Compiler, folder: Path, main: str, output: str, flags: tuple[str, ...]) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from lie_codegen.groups.maps.carried_quaternions import spin_quaternion
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import dot
@@ -92,9 +93,8 @@ def spin_log(ops: Arithmetic, X: Entries) -> list[Scalar]:
 
     Beyond a half turn v = log(-X) + 2 pi v / |v|.
     """
-    (a, b), (c, d) = ([Complex.of(entry) for entry in row] for row in X)
-    q0 = (a.re + d.re) / 2
-    return full_quaternion_log(ops, q0, [-(c.im + b.im) / 2, (c.re - b.re) / 2, (d.im - a.im) / 2])
+    q = spin_quaternion(X)
+    return full_quaternion_log(ops, q[0], q[1:])
 
 
 def full_quaternion_log(ops: Arithmetic, q0: Scalar, q: Sequence[Scalar]) -> list[Scalar]:

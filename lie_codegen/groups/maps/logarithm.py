@@ -17,12 +17,14 @@ from fractions import Fraction
 
 from lie_codegen.groups.derivation import GroupDerivation
 from lie_codegen.groups.maps.analytic_functions import RIGHT_JACOBIAN_INVERSE
+from lie_codegen.groups.maps.carried_quaternions import carried
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian, real_coordinates
 from lie_codegen.groups.maps.linear_family import LinearFamily
 from lie_codegen.groups.maps.log_blocks import (
     Entries,
     complex2_log,
     determinant_3,
+    full_quaternion_log,
     lorentz_log,
     plane_log,
     real2_log,
@@ -33,6 +35,7 @@ from lie_codegen.groups.maps.log_blocks import (
 from lie_codegen.groups.maps.log_structure import LogBlock, LogStructure
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.maps.matrix_function import FunctionOfMatrix
+from lie_codegen.groups.maps.rotation_log import unit_log
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.linear import Matrix, Vector, matadd, matmul, matvec, number, plus
@@ -60,6 +63,9 @@ def candidate(ops: Arithmetic, data: GroupDerivation, X: Entries, iterated: Sequ
 
 def block_log(ops: Arithmetic, block: LogBlock, X: Entries) -> list[Scalar]:
     """The values of the block's linear forms."""
+    known = carried(X, block.indices)
+    if known is not None and not block.scaled:
+        return unit_log(ops, known) if block.kind == "space" else full_quaternion_log(ops, known[0], known[1:])
     part = [[X[i][j] for j in block.indices] for i in block.indices]
     if block.kind == "scale":
         return [ops.log(part[0][0])]
