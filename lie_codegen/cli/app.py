@@ -1,4 +1,4 @@
-"""The command line: lie-codegen list | show | new | check | generate | build | simulate | steer | average | study | page | reproduce | cache."""
+"""The command line: lie-codegen list | show | new | check | generate | build | law | simulate | steer | average | study | page | docs | ..."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from lie_codegen import __version__
-from lie_codegen.cli import averages, bench, code, groups, motion, pages, studies
+from lie_codegen.cli import averages, bench, code, groups, laws, manual, motion, pages, studies
 from lie_codegen.cli.output import complain, emit
 from lie_codegen.codegen.numerics import NUMERICS_VERSION
 from lie_codegen.errors import InputError, LieCodegenError
@@ -41,8 +41,8 @@ def _before(
     """From a Lie algebra to fast C: exact Wei-Norman equations, generated C, simulation and steering."""
 
 
-for _part in (groups.commands, code.commands, motion.commands, averages.commands, pages.commands, bench.commands):
-    for _command in _part:
+for _room in (groups, code, laws, motion, averages, pages, manual, bench):
+    for _command in _room.commands:
         app.command()(_command)
 app.add_typer(studies.app)
 

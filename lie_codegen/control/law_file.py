@@ -26,10 +26,11 @@ from lie_codegen.kernel.kernel import Kernel
 _SUFFIX = "_law"
 
 
-def _laws() -> Mapping[str, str]:
+def law_kinds() -> Mapping[str, Callable[..., Any]]:
     """The public laws of this folder: what a file calls it -> its function. A new one joins by its line in `__init__.pyi`."""
-    names = import_module("lie_codegen.control").__all__
-    return {name.removesuffix(_SUFFIX): name for name in names if name.endswith(_SUFFIX) and name != "read_law"}
+    control = import_module("lie_codegen.control")
+    names = [name for name in control.__all__ if name.endswith(_SUFFIX) and name != "read_law"]
+    return {name.removesuffix(_SUFFIX): getattr(control, name) for name in names}
 
 
 def read_law(path: str | Path, group: GroupLike | None = None) -> Kernel:
@@ -45,10 +46,10 @@ def read_law(path: str | Path, group: GroupLike | None = None) -> Kernel:
             refuses; names the file.
     """
     table = _table(path)
-    kind, laws = table.pop("law", None), _laws()
-    if kind not in laws:
+    kind, laws = table.pop("law", None), law_kinds()
+    if not isinstance(kind, str) or kind not in laws:
         raise InputError(f'{path}: law = {kind!r} is not known; write law = one of "{", ".join(sorted(laws))}"')
-    make: Callable[..., Any] = getattr(import_module("lie_codegen.control"), laws[kind])
+    make = laws[kind]
     known = set(inspect.signature(make).parameters)
     unknown = sorted(set(table) - known - {"group"})
     if unknown:

@@ -276,3 +276,62 @@ def test_what_the_system_refuses_is_no_fault_of_the_input(cli) -> None:
     assert nowhere.returncode == 2
     assert "Not a directory" in nowhere.stderr
     assert all(len(done.stderr.splitlines()) == 1 for done in (full, nowhere))
+
+
+def test_law_lists_kinds_shows_saves_and_writes(cli, tmp_path: Path) -> None:
+    kinds = json.loads(cli("law", "--json").stdout)["kinds"]
+    assert {"attitude", "tracking", "integral", "pointing"} <= set(kinds)
+    assert "K_d" in cli("law", "tracking").stdout
+    Path("t.toml").write_text(
+        'law = "tracking"\ninertia = [1, 2, 3]\nerror = "so3_right"\nfeedforward = "levi_civita"\n'
+        "gains = { K_p = [4, 5, 6], K_d = 6 }\n"
+    )
+    done = cli("law", "t.toml", "--group", "so3", "--certify", "--save", "t.npz", "--out", "pkg", "--json")
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert data["symbol"] == "so3_tracking_law"
+    assert [each["name"] for each in data["inputs"]] == ["X", "xi", "X_d", "xi_d", "xi_d_dot"]
+    assert data["parameters"]["inertia"] == [1, 2, 3]
+    assert data["certificate"]["rate"] > 0
+    assert Path("pkg/include").is_dir()
+    # what was saved is the same law: by its values at one state
+    state = (np.eye(3), [0.1, 0.2, 0.3], np.eye(3)[[1, 2, 0]], [0, 0, 0.1], [0, 0, 0])
+    given = dict(zip(("X", "xi", "X_d", "xi_d", "xi_d_dot"), state, strict=True))
+    again, fresh = (
+        lc.build([law]).tracking_law(**given) for law in (lc.load("t.npz"), lc.read_law("t.toml", group="so3"))
+    )
+    np.testing.assert_array_equal(again.force, fresh.force)
+    assert cli("law", "t.npz").stdout.startswith("so3.tracking_law: f = ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("none.toml",), "cannot be read"),
+        (("nothing",), "neither a file nor a kind of law"),
+        (("none.npz",), "no file that save() wrote"),
+        (("tracking", "--out", "pkg"), "--out is of one law"),
+        (("list.toml",), "law = [1] is not known"),
+        (("plan.npz",), "no law"),
+    ],
+)
+def test_what_is_no_law_is_refused(cli, arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
+    Path("list.toml").write_text("law = [1]\n")
+    lc.group("so3").save("plan.npz")
+    done = cli("law", *arguments)
+    assert done.returncode == 2, done.stderr
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_docs_tells_of_public_names_and_offers_near_ones(cli) -> None:
+    subjects = json.loads(cli("docs", "--json").stdout)["subjects"]
+    told = {name for names in subjects.values() for name in names} | set(subjects)
+    assert set(lc.__all__) - told <= {"__version__"}
+    assert cli("docs", "lc.steer").stdout.startswith("lc.steer(group, target, controls, duration")
+    assert "npz file" in cli("docs", "Plan.save").stdout
+    assert "cost: int_0^duration" in cli("docs", "Plan.cost").stdout
+    for name, near in (("steeer", "steer"), ("Plan.sav", "save"), ("..", "no public name")):
+        done = cli("docs", name)
+        assert done.returncode == 2
+        assert near in done.stderr
