@@ -1,11 +1,12 @@
 /*
- * X' = X hat(xi), y' = F(t, X, y) of many members by the explicit pair 8(5,3), to a tolerance: pair853.c over eight lanes.
+ * X' = X hat(xi), y' = F(t, X, y) of many members by the explicit pair 8(5,3), to a tolerance: pair853.c over twice eight lanes.
  *
  * A lane takes one member from its start to the last time with steps of its own, and then the next that waits: what a member comes to
  * does not depend on its neighbours. All that is in work is kept as the kernels take it, entry i of lane l at 8 i + l:
  *     rate(X_0, y, t, numbers...) -> y'        move(X_0, Theta) -> X_0 exp(Theta)
  * or, where y begins with the elements,
  *     rate(y, t, numbers...) -> y'             move(y) -> X, lift(X) -> the elements of y: of one member
+ * The two halves go stage by stage in turn: a stage waits for the one before, and meanwhile the processor has the other half under way.
  * A step that would pass a wanted time ends there: it costs what a step of its own to that time would, and goes on from it.
  */
 #include <math.h>
@@ -15,7 +16,7 @@
 #include "pair_control.h"
 #include "pair_step.h"
 
-enum { WIDE = 8, PARTS = WIDE * sizeof(double) / sizeof(PairVector) };
+enum { WIDE = 8, HALVES = 2, PARTS = WIDE * sizeof(double) / sizeof(PairVector) };
 
 typedef void (*Block)(const double *const *in, double *const *out); /* of eight members at once, or of one */
 
@@ -31,7 +32,7 @@ typedef struct {
     double *X_out, *y_out;                        /* count x row x packed, count x row x size */
     double *work;                                 /* as `Room` divides it */
     ptrdiff_t most;                               /* attempts of a member at a step */
-    ptrdiff_t begun;                              /* members that have been given a lane */
+    ptrdiff_t begun;                              /* members that have been given a lane, of the first half for both */
     ptrdiff_t steps, rejected, evaluations;       /* of all members together; of eight at a time */
     double stopped;                               /* the time of the member that cannot go on */
     double t[WIDE], t_low[WIDE], h[WIDE];         /* of lanes; h = 0: not known yet */
@@ -114,12 +115,6 @@ static void enter(Lanes *p, ptrdiff_t lane, ptrdiff_t member)
     p->member[lane] = member;
 }
 
-/* Slopes at the part `s` of each lane's step of length h, times h. */
-typedef struct {
-    Lanes *lanes;
-    const double *h;
-} Within;
-
 static void rates(Lanes *p, const double *y, const double *t, double *to)
 {
     const Room room = room_of(p);
@@ -140,29 +135,58 @@ static void rates(Lanes *p, const double *y, const double *t, double *to)
     p->rate(in, out);
 }
 
-/* k_l <- h_l k_l in each lane l. */
-static void stretch(double *k, ptrdiff_t size, const double *h)
+/* y + h sum_j a_j k_j of ENTRIES entries of all lanes, each with its own h, in registers; see PAIR_SUM. */
+#define LANES_SUM(ENTRIES)                                                                          \
+    static inline void lanes_sum_##ENTRIES(const double *a, const unsigned char *used, int count, ptrdiff_t n, const double *k, const double *y, const double *h, double *to) \
+    {                                                                                               \
+        PairVector sum[ENTRIES * PARTS];                                                            \
+        int u, l;                                                                                   \
+        for (l = 0; l < ENTRIES * PARTS; ++l) {                                                     \
+            sum[l] = (PairVector){0.0};                                                             \
+        }                                                                                           \
+        for (u = 0; u < count; ++u) {                                                               \
+            const double weight = a[used[u]];                                                       \
+            const PairVector *from = (const PairVector *)(k + used[u] * n);                         \
+            for (l = 0; l < ENTRIES * PARTS; ++l) {                                                 \
+                sum[l] += weight * from[l];                                                         \
+            }                                                                                       \
+        }                                                                                           \
+        for (l = 0; l < ENTRIES * PARTS; ++l) {                                                     \
+            ((PairVector *)to)[l] = ((const PairVector *)y)[l] + ((const PairVector *)h)[l % PARTS] * sum[l]; \
+        }                                                                                           \
+    }
+LANES_SUM(1)
+LANES_SUM(4)
+
+/* Where stage s asks for its slope, or the state after the step: in `after`, lane by lane with its length h. Four entries at a time, the last perhaps again. */
+static APART void stage(const Lanes *p, int s, const double *h)
 {
-    const PairVector *by = (const PairVector *)h;
-    for (ptrdiff_t i = 0; i < size; ++i) {
-        PairVector *of = (PairVector *)(k + WIDE * i);
-        for (int part = 0; part < PARTS; ++part) {
-            of[part] *= by[part];
-        }
+    const Room room = room_of(p);
+    const double *a = s < STAGES ? A[s] : B;
+    const ptrdiff_t n = WIDE * p->size;
+    ptrdiff_t i = 0;
+    for (; i + 4 <= p->size; i += 4) {
+        lanes_sum_4(a, USED[s], USES[s], n, room.k + WIDE * i, room.y + WIDE * i, h, room.after + WIDE * i);
+    }
+    if (i < p->size && p->size >= 4) {
+        i = p->size - 4;
+        lanes_sum_4(a, USED[s], USES[s], n, room.k + WIDE * i, room.y + WIDE * i, h, room.after + WIDE * i);
+        return;
+    }
+    for (; i < p->size; ++i) {
+        lanes_sum_1(a, USED[s], USES[s], n, room.k + WIDE * i, room.y + WIDE * i, h, room.after + WIDE * i);
     }
 }
 
-static int slope_of(const void *who, double s, const double *y, double *slope)
+/* The slope of stage s, at what `stage` has made. */
+static void slope(Lanes *p, int s, const double *h)
 {
-    const Within *within = who;
-    Lanes *p = within->lanes;
+    const Room room = room_of(p);
     double t[WIDE];
     for (int l = 0; l < WIDE; ++l) {
-        t[l] = p->t[l] + s * within->h[l];
+        t[l] = p->t[l] + C[s] * h[l];
     }
-    rates(p, y, t, slope);
-    stretch(slope, p->size, within->h);
-    return 0;
+    rates(p, room.after, t, room.k + s * WIDE * p->size);
 }
 
 /* The length of a lane's next step, at most to the next time; whether it ends there. */
@@ -196,8 +220,8 @@ static APART void weigh(const Lanes *p)
     }
 }
 
-/* Of each lane: the error over what is allowed (pair853.c), |Theta|^2, and by how much the step may grow for that error. */
-static APART void judge(const Lanes *p, double *error, double *angle, double *growth)
+/* Of each lane with its step h: the error over what is allowed (pair853.c), |Theta|^2, and by how much the step may grow for that error. */
+static APART void judge(const Lanes *p, const double *h, double *error, double *angle, double *growth)
 {
     const Room room = room_of(p);
     PairVector five[PARTS], three[PARTS], squares[PARTS];
@@ -220,7 +244,7 @@ static APART void judge(const Lanes *p, double *error, double *angle, double *gr
     }
     memcpy(angle, squares, sizeof squares);
     for (int l = 0; l < WIDE; ++l) {
-        error[l] = pair_error(((const double *)five)[l], ((const double *)three)[l], 1.0, p->size);
+        error[l] = pair_error(((const double *)five)[l], ((const double *)three)[l], h[l], p->size);
     }
     for (int l = 0; l < WIDE; ++l) {
         growth[l] = longer(error[l]);
@@ -298,20 +322,57 @@ static void settle(Lanes *p, const int *take, int all)
     }
 }
 
-/* Lanes that stand still are given members that wait; whether one has work. */
-static int fill(Lanes *p)
+/* Lanes of a half that stand still are given members that wait; whether one has work. */
+static int fill(Lanes *p, ptrdiff_t *begun)
 {
     int works = 0;
     for (int l = 0; l < WIDE; ++l) {
-        if (p->member[l] < 0 && p->begun < p->members) {
-            enter(p, l, p->begun++);
+        if (p->member[l] < 0 && *begun < p->members) {
+            enter(p, l, (*begun)++);
         }
         works |= p->member[l] >= 0;
     }
     return works;
 }
 
-/* All lanes at the first member, but none at work. */
+/* The steps of a half that are tried next: their lengths, 0 of a lane that stands still, and whether they end at wanted times; the first stage. */
+static void set_out(Lanes *p, double *h, int *ends)
+{
+    const Room room = room_of(p);
+    rates(p, room.y, p->t, room.k);
+    for (int l = 0; l < WIDE; ++l) {
+        p->h[l] = p->h[l] > 0.0 ? p->h[l] : first_step(p->size, WIDE, room.y + l, room.k + l);
+        h[l] = p->member[l] < 0 ? 0.0 : cut(p, l, ends + l);
+    }
+}
+
+/* All stages are there: the steps that are good enough are taken. DONE, or why a member cannot go on. */
+static ptrdiff_t arrive(Lanes *p, const double *h, const int *ends)
+{
+    double error[WIDE], growth[WIDE], angle[WIDE];
+    int take[WIDE], taken = 0, why = DONE;
+    judge(p, h, error, angle, growth);
+    for (int l = 0; l < WIDE; ++l) {
+        const int works = p->member[l] >= 0;
+        take[l] = works && accepted(p, l, h[l], error[l], growth[l], angle[l], &why);
+        taken += take[l];
+        if (works && (why != DONE || ++p->tries[l] > p->most)) {
+            p->stopped = p->t[l];
+            return why != DONE ? why : MANY;
+        }
+    }
+    if (taken) {
+        settle(p, take, taken == WIDE);
+    }
+    for (int l = 0; l < WIDE; ++l) {
+        if (take[l]) {
+            go_on(p, l, h[l], growth[l], ends[l]);
+        }
+    }
+    return DONE;
+}
+
+/* All lanes of a half at the first member, but none at work. */
 EXPORT void lanes_start(Lanes *p);
 EXPORT void lanes_start(Lanes *p)
 {
@@ -321,43 +382,41 @@ EXPORT void lanes_start(Lanes *p)
     }
 }
 
-/* So many steps of every lane, or until all members are at the last time; FULL: call again. */
-EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds);
-EXPORT ptrdiff_t lanes_run(Lanes *p, ptrdiff_t rounds)
+/* So many steps of every lane of both halves, or until all members are at the last time; FULL: call again. `stopped` is of the first half. */
+EXPORT ptrdiff_t lanes_run(Lanes *halves, ptrdiff_t rounds);
+EXPORT ptrdiff_t lanes_run(Lanes *halves, ptrdiff_t rounds)
 {
-    const Room room = room_of(p);
-    for (ptrdiff_t round = 0; fill(p); ++round) {
-        double h[WIDE], error[WIDE], growth[WIDE], angle[WIDE];
-        int ends[WIDE], take[WIDE], taken = 0, why = DONE;
-        const Within within = {p, h};
-        if (round == rounds) {
-            return FULL;
+    for (ptrdiff_t round = 0;; ++round) {
+        double h[HALVES][WIDE];
+        int ends[HALVES][WIDE], works[HALVES], some = 0;
+        for (int g = 0; g < HALVES; ++g) {
+            works[g] = fill(halves + g, &halves[0].begun);
+            some |= works[g];
         }
-        rates(p, room.y, p->t, room.k);
-        for (int l = 0; l < WIDE; ++l) {
-            p->h[l] = p->h[l] > 0.0 ? p->h[l] : first_step(p->size, WIDE, room.y + l, room.k + l);
-            h[l] = p->member[l] < 0 ? 0.0 : cut(p, l, ends + l);
+        if (!some || round == rounds) {
+            return some ? FULL : DONE;
         }
-        stretch(room.k, p->size, h);
-        pair_step(slope_of, &within, WIDE * p->size, 0.0, room.y, 1.0, room.k, room.after, room.after);
-        judge(p, error, angle, growth);
-        for (int l = 0; l < WIDE; ++l) {
-            const int works = p->member[l] >= 0;
-            take[l] = works && accepted(p, l, h[l], error[l], growth[l], angle[l], &why);
-            taken += take[l];
-            if (works && (why != DONE || ++p->tries[l] > p->most)) {
-                p->stopped = p->t[l];
-                return why != DONE ? why : MANY;
+        for (int g = 0; g < HALVES; ++g) {
+            if (works[g]) {
+                set_out(halves + g, h[g], ends[g]);
             }
         }
-        if (taken) {
-            settle(p, take, taken == WIDE);
+        for (int s = 1; s <= STAGES; ++s) {
+            for (int g = 0; g < HALVES; ++g) {
+                if (works[g]) {
+                    stage(halves + g, s, h[g]);
+                    if (s < STAGES) {
+                        slope(halves + g, s, h[g]);
+                    }
+                }
+            }
         }
-        for (int l = 0; l < WIDE; ++l) {
-            if (take[l]) {
-                go_on(p, l, h[l], growth[l], ends[l]);
+        for (int g = 0; g < HALVES; ++g) {
+            const ptrdiff_t status = works[g] ? arrive(halves + g, h[g], ends[g]) : DONE;
+            if (status != DONE) {
+                halves[0].stopped = halves[g].stopped;
+                return status;
             }
         }
     }
-    return DONE;
 }

@@ -19,6 +19,7 @@ from lie_codegen.errors import ComputationError
 from lie_codegen.flow.pair_lanes import run_lanes
 from lie_codegen.flow.pair_library import DONE, FULL, MANY, compiled_pair, refuse
 from lie_codegen.flow.pair_system import System
+from lie_codegen.runtime.outputs import empty
 from lie_codegen.runtime.threads import share_out
 
 #: Steps in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C; room for as many knots, at first for fewer.
@@ -210,17 +211,16 @@ def _many(
     system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str, threads: int = 1
 ) -> PairRun:
     """One run of members that are shared out over threads; one after another where lanes cannot be had."""
-    X_out, y_out = np.empty((len(times), *X0.shape)), np.empty((len(times), *y0.shape))
+    X_out, y_out = (empty((len(times), *each.shape), each.dtype) for each in (X0, y0))
     X_out[0], y_out[0] = X0, y0
     behind = X_out[1:], y_out[1:]
 
     def part(first: int, last: int) -> tuple[int, int, int]:
         some = slice(first, last)
         if all(system.blocks):
-            record = run_lanes(
+            return run_lanes(
                 system.of_members(some), (X0[some], y0[some]), times, behind, first, rtol, atol, _MOST_STEPS, where
             )
-            return record.steps, record.rejected, record.evaluations
         runs = []
         for m in range(first, last):
             runs.append(

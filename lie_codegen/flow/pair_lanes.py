@@ -1,4 +1,4 @@
-"""Many members by the pair 8(5,3) over eight lanes, each with steps of its own: templates/pair_lanes.c."""
+"""Many members by the pair 8(5,3) over twice eight lanes, each with steps of its own: templates/pair_lanes.c."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lie_codegen.runtime.pair_headers import group_headers
 from lie_codegen.runtime.sources import build_source
 from lie_codegen.runtime.threads import stopped
 
-WIDE = 8
+WIDE, HALVES = 8, 2
 #: Steps of every lane in one call of compiled code, after which Python looks whether somebody pressed Ctrl-C.
 _ROUNDS = 4096
 
@@ -66,8 +66,8 @@ def run_lanes(
     atol: float,
     most: int,
     where: str,
-) -> Lanes:
-    """Members of `system` from their starts, their states to the members from `first` on of `out`; the record counts steps.
+) -> tuple[int, int, int]:
+    """Members of `system` from their starts, their states to the members from `first` on of `out`.
 
     Args:
         system: whose numbers are those of these members alone.
@@ -79,6 +79,9 @@ def run_lanes(
         most: attempts of a member at a step.
         where: for messages.
 
+    Returns:
+        Steps, those rejected, evaluations of the rate, eight at a time.
+
     Raises:
         ComputationError: a member takes too many steps, needs one that is too short, or leaves the range of doubles.
         CompileError: there is no compiler.
@@ -89,17 +92,24 @@ def run_lanes(
     sizes = [port.size for port in system.number_ports]
     pointers = (ctypes.c_void_p * max(1, len(numbers)))(*(each.ctypes.data for each in numbers))
     moves, wide = ((ctypes.c_ssize_t * max(1, len(numbers)))(*each) for each in (strides, sizes))
-    work = np.zeros(WIDE * (2 * system.packed + (5 + STAGES) * system.size + sum(sizes)))
-    given = Lanes(
+    size = WIDE * (2 * system.packed + (5 + STAGES) * system.size + sum(sizes))
+    room = np.zeros(HALVES * size + WIDE)
+    work = room.ctypes.data + -room.ctypes.data % 64  # each half as the registers lie
+    one = Lanes(
         *system.blocks, system.lifting, len(X), system.packed, system.turns, system.group, system.quaternions, system.size,
         len(numbers),
         ctypes.addressof(pointers), ctypes.addressof(moves), ctypes.addressof(wide),
         rtol, atol, system.reach, X.ctypes.data, y.ctypes.data, at.ctypes.data, len(at) - 1, out[0].shape[1],
-        out[0].ctypes.data + 8 * first * system.packed, out[1].ctypes.data + 8 * first * system.size, work.ctypes.data, most,
+        out[0].ctypes.data + 8 * first * system.packed, out[1].ctypes.data + 8 * first * system.size, work, most,
     )  # fmt: skip
+    halves = (Lanes * HALVES)(one, one)
     library, status = _library(), FULL
-    library.lanes_start(ctypes.addressof(given))
+    for k, half in enumerate(halves):
+        half.work = work + 8 * k * size
+        library.lanes_start(ctypes.addressof(half))
     while status == FULL and not stopped():
-        status = library.lanes_run(ctypes.addressof(given), _ROUNDS)
-    refuse(status, given.stopped, atol, most, where)
-    return given
+        status = library.lanes_run(ctypes.addressof(halves), _ROUNDS)
+    refuse(status, halves[0].stopped, atol, most, where)
+    counts = np.sum([(half.steps, half.rejected, half.evaluations) for half in halves], axis=0)
+    steps, rejected, evaluations = counts.tolist()
+    return steps, rejected, evaluations
