@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
 from typing import Any, ClassVar
@@ -15,6 +15,8 @@ from lie_codegen.door import guard_methods
 #: Lines and characters of a printed value.
 _LINES, _WIDTH = 10, 110
 _FEW = 4
+#: Classes of values that are keys by themselves, and bytes of the largest array that is part of one.
+_ATOMS, _LARGEST = frozenset({bool, int, str}), 2**15
 _ENTRIES = 6
 
 
@@ -116,6 +118,34 @@ def same(a: Any, b: Any) -> bool:
     if is_dataclass(a) and type(a) is type(b):
         return all(same(getattr(a, name), getattr(b, name)) for name in _compared(a))
     return bool(a == b) or (_is_nan(a) and _is_nan(b))
+
+
+def contents(value: Any) -> Hashable:
+    """What plain data and frozen records of it hold, as a key by which they are known again: arrays by their bytes, so that one which
+    was changed in place is another.
+
+    Raises:
+        TypeError: it is a function, or what may change unseen, or holds such, or an array of over 32 kB.
+    """
+    kind = type(value)
+    if value is None or kind in _ATOMS:
+        return kind, value
+    if kind is float:
+        return kind, value or repr(value)  # 0.0 and -0.0 are equal
+    if kind is complex:
+        return kind, repr(value)
+    if kind is np.ndarray and value.dtype.kind in "fciub" and value.nbytes <= _LARGEST:
+        return value.shape, value.dtype, value.tobytes()
+    if kind in (list, tuple):
+        return kind, *map(contents, value)
+    if kind is dict:
+        return kind, *map(contents, value), *map(contents, value.values())
+    definition = getattr(value, "definition", None)
+    if definition is not None:  # it is what that says
+        return kind, definition
+    if is_dataclass(kind) and kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+        return kind, *(contents(getattr(value, each.name)) for each in fields(value))
+    raise TypeError(f"{kind.__name__} is not known by what it holds")
 
 
 def brief(value: Any) -> str:

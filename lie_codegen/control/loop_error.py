@@ -9,7 +9,7 @@ import numpy as np
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
 from lie_codegen.flow.attitude_metrics import rotation_angle
-from lie_codegen.flow.libraries import logarithms
+from lie_codegen.groups.build import library_of
 from lie_codegen.runtime.rows import row_by_row
 
 
@@ -26,5 +26,5 @@ def loop_error(group: Any, X: Array, X_d: Array | None) -> Array:
     try:
         distance = rotation_angle(group, flat)
     except InputError:
-        distance = np.linalg.norm(row_by_row(logarithms(group).log, flat)[0], axis=-1)
+        distance = np.linalg.norm(row_by_row(library_of(group).log, flat)[0], axis=-1)
     return np.asarray(distance).reshape(X.shape[:-2])

@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from lie_codegen.errors import InputError, ShapeError
@@ -17,6 +18,7 @@ from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.linear import Vector
 from lie_codegen.on_demand import sympy as sp
 from lie_codegen.runtime.formula_input import has_formula
+from lie_codegen.values import Value
 
 #: (ops, t, X, g) -> u; X or g is None where the feedback does not read it.
 LawBody = Callable[[Arithmetic, Scalar, Any, Any], Vector]
@@ -76,10 +78,23 @@ def as_feedback(group: MatrixGroup, u: Any) -> Feedback | None:
 
 def _second_argument(function: Any) -> str | None:
     """The name of the second of the arguments that must be given, None for a function of one."""
+    if isinstance(function, Value):  # its class says it
+        kind: Any = type(function)
+        return _second_of_class(kind)
     try:
-        parameters = inspect.signature(function).parameters.values()
+        return _second(inspect.signature(function))
     except (TypeError, ValueError):
         return None
+
+
+@lru_cache(maxsize=64)
+def _second_of_class(kind: Any) -> str | None:
+    signature = inspect.signature(kind.__call__)
+    return _second(signature.replace(parameters=list(signature.parameters.values())[1:]))
+
+
+def _second(signature: inspect.Signature) -> str | None:
+    parameters = signature.parameters.values()
     kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     needed = [each.name for each in parameters if each.kind in kinds and each.default is inspect.Parameter.empty]
     return needed[1] if len(needed) == 2 else None

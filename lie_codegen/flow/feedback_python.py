@@ -9,8 +9,8 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, ShapeError
-from lie_codegen.flow.libraries import logarithms
 from lie_codegen.flow.product_rate import reach_of, turning
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.derivation import derivation_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import rate as wei_norman_rate
@@ -39,7 +39,7 @@ def _alone(
     rtol: float, atol: float, where: str,
 ) -> tuple[Array, Array, Array, int, int]:  # fmt: skip
     n, ops, data = group.dim, FloatArithmetic(), derivation_of(group).wei_norman
-    exp, reach = logarithms(group).exp, min(1.0, reach_of(group, closed=True)) / 2
+    exp, reach = library_of(group).exp, min(1.0, reach_of(group, closed=True)) / 2
     scale = np.full(n + len(g0), max(atol, rtol * 1e-3))
 
     def value(t: float, X: Array, g: Array) -> Array:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +15,14 @@ from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
+from lie_codegen.values import Value, contents
 
+if TYPE_CHECKING:
+    from lie_codegen.signals.resolved_input import ResolvedInput
+
+#: Functions that were resolved, by what they hold: so many at most, of so many bytes.
+_kept: dict[Hashable, ResolvedInput] = {}
+_MOST, _LARGEST = 32, 2**20
 #: How far a value that is asked for alone may lie from the same among others, relative to the largest.
 _ALIKE = 1e-13
 
@@ -28,12 +36,14 @@ class Signal:
         evaluate: (k,) times -> (k, n).
         breakpoints: the times at which it is not smooth.
         formula: what compiled loops evaluate themselves, or None.
+        source: what was given, where it is a value.
     """
 
     dim: int
     evaluate: Callable[[Array], Array]
     breakpoints: Array
     formula: FormulaInput | None = None
+    source: Value | None = None
 
     def __call__(self, t: Array) -> Array:
         """(k,) times -> (k, n)."""
@@ -57,7 +67,8 @@ def as_signal(group: MatrixGroup, u: Any, t: Array) -> Signal:
             raise ShapeError(f"simulate({group.name}): u has {formula.dim} components; the algebra has {group.dim}")
         return _of_formula(formula, t)
     if callable(u):
-        return Signal(group.dim, _vectorised(group, u, t), _breakpoints(u, t))
+        source = u if isinstance(u, Value) else None
+        return Signal(group.dim, _vectorised(group, u, t), _breakpoints(u, t), source=source)
     values = _numbers(group, u, "u")
     if not np.all(np.isfinite(values)):
         raise NotFiniteError(f"simulate({group.name}): u holds NaN or infinity")
@@ -83,13 +94,32 @@ def as_drive(
     """
     if signal.formula is not None:
         return formula_drive(signal.formula, eps)
+    tolerance = 0.2 * rtol / max(float(np.max(np.abs(eps))), 1e-300)
+    found = _pieces(signal, float(t[0]), float(t[-1]), tolerance, resolution, f"simulate({group.name})")
+    return resolved_drive(found, eps)
+
+
+def _pieces(
+    signal: Signal, start: float, end: float, tolerance: float, resolution: float | None, where: str
+) -> ResolvedInput:
+    """A function resolved; that of a value of plain data, as the controls of a plan, is kept for runs to come."""
     from lie_codegen.signals.resolved_input import resolve_function
 
-    found = resolve_function(
-        signal.evaluate, float(t[0]), float(t[-1]), tolerance=0.2 * rtol / max(float(np.max(np.abs(eps))), 1e-300),
-        resolution=resolution, breakpoints=signal.breakpoints, where=f"simulate({group.name})",
-    )  # fmt: skip
-    return resolved_drive(found, eps)
+    key = None
+    if signal.source is not None:
+        with suppress(TypeError):
+            key = contents(signal.source), start, end, tolerance, resolution
+    found = None if key is None else _kept.get(key)
+    if found is None:
+        found = resolve_function(
+            signal.evaluate, start, end, tolerance=tolerance, resolution=resolution, breakpoints=signal.breakpoints, where=where
+        )  # fmt: skip
+        if key is not None and found.series.nbytes <= _LARGEST:
+            while len(_kept) >= _MOST:
+                _kept.pop(next(iter(_kept)), None)
+            found.series.flags.writeable = found.times.flags.writeable = found.corners.flags.writeable = False
+            _kept[key] = found
+    return found
 
 
 def drive_signal(drive: Drive, t: Array) -> Signal:

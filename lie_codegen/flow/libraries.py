@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from lie_codegen.errors import InputError
 from lie_codegen.flow.simulate_arguments import FOURTH_ORDER
-from lie_codegen.groups.build import build
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.call import Compiled
@@ -29,12 +28,6 @@ def integrators(group: MatrixGroup) -> Library:
         return [rkmk4_step(group), wei_norman_step(group), *named]
 
     return build_kernels(kernels, namespace=group.name, definition=f"integrators\n{group.definition_text}")
-
-
-@lru_cache(maxsize=32)
-def logarithms(group: MatrixGroup) -> Library:
-    """exp and log of the group, compiled when first called."""
-    return build(group)
 
 
 def step_of(group: MatrixGroup, method: str) -> Compiled[Any]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError
-from lie_codegen.flow.libraries import logarithms
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.on_demand import scipy
@@ -25,7 +25,7 @@ def matrix_log(group: MatrixGroup, X: ArrayLike) -> tuple[Array, float]:
     """Coordinates x of the principal logarithm of X, and max |exp(hat(x)) - X|: zero where X = exp(hat(x))."""
     matrix = np.asarray(X)
     small = matrix - np.eye(group.degree)
-    if float(np.max(np.abs(small))) <= _NEAR / group.degree:
+    if float(np.abs(small).max()) <= _NEAR / group.degree:
         logarithm = small @ (np.eye(group.degree) - small @ (np.eye(group.degree) / 2 - small / 3))
         x = group.project(logarithm)
         return x, float(np.max(np.abs(group.hat(x) - logarithm)))
@@ -44,13 +44,13 @@ def _compiled_log(group: MatrixGroup, matrix: Array) -> Array | None:
     """By the group's own kernels, of a group small enough to have them at once, where exp of the result is the matrix."""
     if group.dim > _SMALL:
         return None
-    maps = logarithms(group)
+    maps = library_of(group)
     with np.errstate(all="ignore"):
         x = np.asarray(maps.log(np.ascontiguousarray(matrix, dtype=group.basis.dtype)))
-        if not np.all(np.isfinite(x)):
+        if not np.isfinite(x).all():
             return None
-        off = np.max(np.abs(maps.exp(x) - matrix))
-    return x if off <= _IN_ALGEBRA * max(1.0, float(np.max(np.abs(matrix)))) else None
+        off = np.abs(maps.exp(x) - matrix).max()
+    return x if off <= _IN_ALGEBRA * max(1.0, float(np.abs(matrix).max())) else None
 
 
 def _unipotent_log(group: MatrixGroup, matrix: Array) -> Array | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
@@ -78,6 +79,12 @@ def built_group(group: MatrixGroup, name: str | None) -> GroupLibrary:
     library = group_library(object_definition(group), lambda: group, name)
     library.made_by(built_group, group, name)
     return library
+
+
+@lru_cache(maxsize=64)
+def library_of(group: MatrixGroup) -> GroupLibrary:
+    """`build(group)` once a process, for what asks for a map of a group in every call: a library of its own looks for compilers again."""
+    return build(group)
 
 
 def _build_named(what: str | Path, name: str | None) -> GroupLibrary:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,6 +86,11 @@ class MatrixGroup:
         return array
 
     @cached_property
+    def _basis_rows(self) -> Array:
+        """(n, d^2) the matrices A_i, row by row."""
+        return self.basis.reshape(self.dim, -1)
+
+    @cached_property
     def coordinate_rows(self) -> Array:
         """(n, 2 d^2) coordinates from the real parts of all entries, row by row, then the imaginary parts."""
         stacked = np.array([np.concatenate([m.real.ravel(), m.imag.ravel()]) for m in self.basis])
@@ -100,7 +106,8 @@ class MatrixGroup:
         vector = _numbers(x, f"{self.name}.hat: x", float)
         if vector.ndim < 1 or vector.shape[-1] != self.dim:
             raise ShapeError(f"{self.name}.hat: x has shape {vector.shape}; its last axis must be {self.dim}")
-        return np.tensordot(vector, self.basis, axes=(-1, 0))
+        matrices: Array = (vector @ self._basis_rows).reshape(*vector.shape[:-1], self.degree, self.degree)
+        return matrices
 
     def vee(self, A: ArrayLike) -> Array:
         """The x with hat(x) = A: (..., d, d) -> (..., n).
@@ -115,11 +122,12 @@ class MatrixGroup:
         d = self.degree
         if matrix.shape[-2:] != (d, d):
             raise ShapeError(f"{self.name}.vee: A has shape {matrix.shape}; its last axes must be ({d}, {d})")
-        if not np.all(np.isfinite(matrix)):
+        size = float(np.abs(matrix).max(initial=0.0))  # not finite where an entry is not
+        if not isfinite(size) and not np.all(np.isfinite(matrix)):
             raise NotFiniteError(f"{self.name}.vee: A holds NaN or infinity")
         x = self.project(matrix)
-        off = float(np.max(np.abs(self.hat(x) - matrix), initial=0.0))
-        if off > 1e-9 * max(1.0, float(np.max(np.abs(matrix), initial=0.0))):
+        off = float(np.abs(self.hat(x) - matrix).max(initial=0.0))
+        if off > 1e-9 * max(1.0, size):
             raise NotInAlgebraError(
                 f"{self.name}.vee: A is not in the algebra; the nearest element of the span of "
                 f"{', '.join(self.labels)} differs by {off:.3g}"

@@ -13,7 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.codegen.target_functions import compile_folder
 from lie_codegen.codegen.wasm import wasm_binary
 from lie_codegen.errors import InputError, MissingDependencyError
-from lie_codegen.flow.libraries import logarithms
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.generate import generate
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.scene import motion_of
@@ -69,7 +69,7 @@ def page_solver(plan: Any) -> dict[str, Any]:
     size = group.degree**2 * (2 if group.is_complex else 1)
     shape = {"prefix": header.stem, "size": size, "controls": len(plan.controls), "points": _POINTS}
     binary = wasm_binary(tree, _WRAPPER.format(**shape), _EXPORTS)
-    x = logarithms(group).log(np.asarray(plan.target))
+    x = library_of(group).log(np.asarray(plan.target))
     weights = plan.details.get("weights")
     return {
         "kind": "steer",

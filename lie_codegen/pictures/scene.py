@@ -10,7 +10,7 @@ import numpy as np
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError
-from lie_codegen.flow.libraries import logarithms
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.pictures.solid_lines import edges
 from lie_codegen.runtime.rows import row_by_row
@@ -75,7 +75,7 @@ def motion_of(group: MatrixGroup, X: Array) -> Motion:
         R = np.tile(np.eye(3), (len(X), 1, 1))
         R[:, :2, :2] = X[:, :2, :2]
         return Motion("plane", R, np.column_stack([X[:, :2, 2], np.zeros(len(X))]))
-    x = row_by_row(logarithms(group).log, np.ascontiguousarray(X))[0]
+    x = row_by_row(library_of(group).log, np.ascontiguousarray(X))[0]
     p = np.zeros((len(X), 3))
     p[:, : min(3, group.dim)] = np.nan_to_num(x[:, :3])
     return Motion("point", np.tile(np.eye(3), (len(X), 1, 1)), p)
@@ -83,7 +83,7 @@ def motion_of(group: MatrixGroup, X: Array) -> Motion:
 
 def distance_curve(group: MatrixGroup, X: Array, target: Array, name: str) -> Curves:
     """|log(target^-1 X)| along a path."""
-    x = row_by_row(logarithms(group).log, np.ascontiguousarray(np.linalg.solve(target, X)))[0]
+    x = row_by_row(library_of(group).log, np.ascontiguousarray(np.linalg.solve(target, X)))[0]
     return Curves(name, "", [""], np.linalg.norm(x, axis=1)[:, None])
 
 

@@ -6,7 +6,7 @@ A record belongs to the source of this package and the versions of what it compu
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from fractions import Fraction
 from typing import Any, TypeVar
 
@@ -17,14 +17,25 @@ from lie_codegen.kernel.saved import record_of, value_of
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 from lie_codegen.runtime.digests import digest, package_digest, versions
+from lie_codegen.values import contents
 
 T = TypeVar("T")
 
 
+#: What was found or made in this process, by its source, so that no file is read twice; the oldest goes first.
+_known: dict[Hashable, Any] = {}
+_MOST = 256
+
+
 def find_record(kind: str, source: Any) -> Any:
-    """The record that was stored for this source (plain data); None if there is none."""
-    folder = cache_folder()
-    return None if why_unusable(folder) is not None else cache.find_note(folder, _key(kind, source))
+    """The record that was stored for this source (plain data, to which nobody writes); None if there is none."""
+    asked = _asked("record", kind, source)
+    found = _known.get(asked)
+    if found is None:
+        folder = cache_folder()
+        found = None if why_unusable(folder) is not None else cache.find_note(folder, _key(kind, source))
+        _keep(asked, found)
+    return found
 
 
 def store_record(kind: str, source: Any, record: Any) -> None:
@@ -40,15 +51,34 @@ def recalled(kind: str, source: Any, of: type[T], make: Callable[[], T]) -> T:
 
     Args:
         kind, source: plain data that determines it.
-        of: its class, a dataclass of plain data.
+        of: its class, a dataclass of plain data. Who asks again gets the same one: it is a value, to which nobody writes.
     """
+    asked = _asked("value", kind, source)
+    known = _known.get(asked)
+    if isinstance(known, of):
+        return known
     with contextlib.suppress(InputError):
         found = value_of(find_record(kind, source))
         if isinstance(found, of):
+            _keep(asked, found)
             return found
     made = make()
     store_record(kind, source, record_of(made))
     return made
+
+
+def _asked(form: str, kind: str, source: Any) -> Hashable:
+    """A key; None where the source has none."""
+    with contextlib.suppress(TypeError):
+        return form, kind, contents(source)
+    return None
+
+
+def _keep(asked: Hashable, found: Any) -> None:
+    if asked is not None and found is not None:
+        while len(_known) >= _MOST:
+            _known.pop(next(iter(_known)), None)
+        _known[asked] = found
 
 
 def source_of(*given: Any) -> Any:

@@ -19,7 +19,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.exact.positive_matrix import positive_matrix
 from lie_codegen.flow.elements import group_element
-from lie_codegen.groups.build import build
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.change_of_basis import change_of_basis
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -66,7 +66,7 @@ class KineticMetric(Saved):
         if path.ndim != 3 or len(path) < 2 or path.shape[1:] != (self.group.degree,) * 2:
             raise ShapeError(f"length takes (k, {self.group.degree}, {self.group.degree}) elements, got {path.shape}")
         steps = np.linalg.inv(path[:-1]) @ path[1:]
-        return float(np.sum(self.norm(row_by_row(build(self.group).log, np.ascontiguousarray(steps))[0])))
+        return float(np.sum(self.norm(row_by_row(library_of(self.group).log, np.ascontiguousarray(steps))[0])))
 
     def geodesic(self, X: ArrayLike, Y: ArrayLike) -> Plan:
         """The shortest geodesic found from X to Y in unit time, a plan from the identity to X^{-1} Y in the basis `frame`.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from importlib import import_module
+from math import isfinite
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -63,16 +64,18 @@ def inside(times: Array, duration: float | None) -> Array:
     Raises:
         NotFiniteError, InputError: a time that is none, or outside [0, duration].
     """
-    if not np.all(np.isfinite(times)):
+    if not times.size:
+        return times
+    first, last = float(times.min()), float(times.max())  # NaN where one is
+    if not (isfinite(first) and isfinite(last)):
         raise NotFiniteError("u(t): a time is NaN or infinite")
-    if duration is None or not times.size:
+    if duration is None:
         return times
     slack = _ROUNDING * duration
-    first, last = float(np.min(times)), float(np.max(times))
     if first < -slack or last > duration + slack:
         outside = first if first < -slack else last
         raise InputError(f"u(t) is known on [0, {duration:g}]; t = {outside:g} is outside")
-    return np.clip(times, 0.0, duration)
+    return np.asarray(times.clip(0.0, duration))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.flow.libraries import logarithms
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.studies.results import Of, Single
 
@@ -109,5 +109,5 @@ def _beside(reference: Array, values: Array) -> Array:
 
 def _size(group: MatrixGroup, X: Array) -> Array:
     """|log X| of (k, N, d, d)."""
-    x = logarithms(group).log.batch(np.ascontiguousarray(X.reshape(-1, *X.shape[-2:])))
+    x = library_of(group).log.batch(np.ascontiguousarray(X.reshape(-1, *X.shape[-2:])))
     return np.asarray(np.linalg.norm(x, axis=-1)).reshape(X.shape[:-2])

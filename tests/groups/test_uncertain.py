@@ -12,7 +12,7 @@ import scipy.linalg
 from generators import haar_rotation
 
 import lie_codegen as lc
-from lie_codegen.errors import ComputationError, InputError, NotOnGroupError, ShapeError, SpreadWarning
+from lie_codegen.errors import ComputationError, InputError, NotFiniteError, NotOnGroupError, ShapeError, SpreadWarning
 from lie_codegen.groups.maps.covariance_kernels import covariance_kernels
 
 GROUPS = ["so3", "se3", "se2", "sl2", "su2", "su3", "so31", "h3", "sim2", "osc4"]
@@ -244,3 +244,17 @@ def test_the_kernels_agree_with_the_methods(name):
     )
     np.testing.assert_allclose(term.slope, J.T @ W @ e, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(term.normal, J.T @ W @ J, rtol=1e-6, atol=1e-5)
+
+
+def test_the_mean_is_nobodys_memory_and_names_the_element_that_is_off():
+    one = np.eye(3)[None].copy()
+    found = lc.mean("so3", one)
+    one[:] = 7.0
+    np.testing.assert_array_equal(found.X, np.eye(3))
+    several = np.repeat(np.eye(3)[None], 4, axis=0)
+    several[2, 0, 0] = 2.0
+    with pytest.raises(NotOnGroupError, match=r"mean: Xs\[2\]"):
+        lc.mean("so3", several)
+    several[2, 0, 0] = np.nan
+    with pytest.raises(NotFiniteError, match=r"mean: Xs\[2\]"):
+        lc.mean("so3", several)

@@ -166,3 +166,18 @@ def test_the_path_of_a_plan_is_that_of_its_own_system(options: dict[str, Any]) -
         a, b = plan.X(3.0), plan.X(3.0 + 1e-5)
         rate = so3.hat(plan.u(3.0) + np.array([0, 0, 0.3]))
         np.testing.assert_allclose((b - a) / 1e-5, rate @ a, atol=1e-4)
+
+
+def test_controls_that_were_changed_in_place_are_read_anew() -> None:
+    """Controls of plain data are resolved once; who changes an array within has other controls."""
+    plan = lc.steer("so3", G, controls=("w1", "w2"), duration=4.0, method="circle")
+    before = plan.X(4.0)
+    np.testing.assert_array_equal(plan.X(4.0), before)
+    again = lc.simulate("so3", plan.u.scaled(np.full(3, 0.5)), t=[0.0, 4.0]).X[-1]
+    factor = np.full(3, 0.5)
+    scaled = plan.u.scaled(factor)
+    np.testing.assert_array_equal(lc.simulate("so3", scaled, t=[0.0, 4.0]).X[-1], again)
+    factor[:] = 1.0
+    assert np.max(np.abs(lc.simulate("so3", scaled, t=[0.0, 4.0]).X[-1] - before)) < 1e-9
+    factor[:] = 0.5
+    np.testing.assert_array_equal(lc.simulate("so3", scaled, t=[0.0, 4.0]).X[-1], again)

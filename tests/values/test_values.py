@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lie_codegen.values import Value, brief, same
+from lie_codegen.values import Value, brief, contents, same
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,3 +85,21 @@ def test_a_repr_is_short_and_shows_no_entries() -> None:
     many = [np.arange(100.0)] * 100
     assert len(brief(many)) < 500
     assert "\n" not in brief({"a": many, "b": np.eye(9)})
+
+
+def test_contents_are_a_key_and_change_with_an_array_that_is_changed_in_place() -> None:
+    one, other = run(), run()
+    before = contents(one)
+    assert hash(before) == hash(contents(other))
+    assert before == contents(other)
+    one.t[1] = 7.0
+    assert contents(one) != before
+    assert contents(run(t=np.arange(4))) != before  # integers
+    assert contents(run(note="b")) != before
+    assert len({contents(each) for each in (0, False, 0.0, -0.0, 0j, complex(0.0, -0.0), "", "0.0", None)}) == 9
+
+
+@pytest.mark.parametrize("held", [lambda: 1, object(), {1, 2}, np.zeros(5000), np.array([None])])
+def test_what_may_change_unseen_has_no_contents(held: Any) -> None:
+    with pytest.raises(TypeError):
+        contents(run(t=held))

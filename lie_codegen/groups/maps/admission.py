@@ -11,21 +11,16 @@ With kappa = max(1, |X| |X^-1|), the sizes of the largest entries, and `defect` 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import NotFiniteError, NotOnGroupError, ShapeError
-from lie_codegen.groups.build import build
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.rows import row_by_row
-
-if TYPE_CHECKING:
-    from lie_codegen.runtime.library import Library
 
 #: On the group to rounding, relative to kappa.
 ON_GROUP = 1e-12
@@ -56,7 +51,7 @@ def admitted(group: MatrixGroup, X: ArrayLike, where: str) -> Admitted:
         NotOnGroupError: naming `where`, the condition that fails with its figure, and the distance of the nearest element.
     """
     matrix = _matrix(group, X, where)
-    off = float(_library(group).defect(matrix))
+    off = float(library_of(group).defect(matrix))
     if off <= ON_GROUP:
         return Admitted(matrix, 0.0)
     with np.errstate(all="ignore"):
@@ -75,7 +70,7 @@ def admitted(group: MatrixGroup, X: ArrayLike, where: str) -> Admitted:
             return Admitted(found.X, float(found.distance))
     from lie_codegen.groups.maps.refusal import why_refused
 
-    reason = why_refused(group, matrix, lambda other: float(_library(group).defect(other)))
+    reason = why_refused(group, matrix, lambda other: float(library_of(group).defect(other)))
     raise NotOnGroupError(f"{where} is not on the group {group.name}: {reason}")
 
 
@@ -86,7 +81,7 @@ def admitted_all(group: MatrixGroup, X: Array, where: str) -> tuple[Array, Array
         NotOnGroupError: naming the first that is refused by its number.
     """
     several = np.ascontiguousarray(X, dtype=group.basis.dtype)
-    if np.all(row_by_row(_library(group).defect, several)[0] <= ON_GROUP):
+    if np.all(row_by_row(library_of(group).defect, several)[0] <= ON_GROUP):
         return several, np.zeros(len(several))
     each = [admitted(group, matrix, f"{where}[{number}]") for number, matrix in enumerate(several)]
     return np.array([one.X for one in each]), np.array([one.projected for one in each])
@@ -112,8 +107,3 @@ def _matrix(group: MatrixGroup, X: ArrayLike, where: str) -> Array:
     if not isfinite(np.vdot(matrix, matrix).real) and not np.all(np.isfinite(matrix)):
         raise NotFiniteError(f"{where} holds NaN or infinity")
     return matrix
-
-
-@lru_cache(maxsize=64)
-def _library(group: MatrixGroup) -> Library:
-    return build(group)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError
-from lie_codegen.groups.build import build
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.catalogue_load import as_group
-from lie_codegen.groups.maps.admission import admitted
+from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.rows import row_by_row
@@ -61,7 +61,7 @@ def mean(group: MatrixGroup | str | Path, Xs: ArrayLike, weights: ArrayLike | No
     found = as_group(group)
     elements = _elements(found, Xs, "mean: Xs")
     w = _weights(weights, len(elements))
-    lib = build(found)
+    lib = library_of(found)
     X = elements[int(np.argmax(w))]
     last, step = np.inf, np.inf
     for iterations in range(1, _MOST_STEPS + 1):  # noqa: B007
@@ -108,7 +108,7 @@ def interpolate(group: MatrixGroup | str | Path, X: ArrayLike, Y: ArrayLike, s: 
     if not np.all(np.isfinite(parts)):
         raise NotFiniteError("interpolate: s holds NaN or infinity")
     [x] = _logarithms(found, start, end[None], "interpolate")
-    moved = row_by_row(build(found).exp, np.ascontiguousarray(parts.reshape(-1, 1) * x))[0]
+    moved = row_by_row(library_of(found).exp, np.ascontiguousarray(parts.reshape(-1, 1) * x))[0]
     result: Array = (start @ moved).reshape(*parts.shape, found.degree, found.degree)
     return result
 
@@ -117,6 +117,12 @@ def _elements(group: MatrixGroup, given: ArrayLike, where: str) -> Array:
     several = list(given) if isinstance(given, list | tuple) else np.asarray(given)
     if not len(several):
         raise ShapeError(f"{where}: give one element of {group.name} at least")
+    if (
+        isinstance(several, np.ndarray)
+        and several.shape[1:] == (group.degree,) * 2
+        and several.dtype == group.basis.dtype
+    ):
+        return np.array(admitted_all(group, several, where)[0])  # the mean of one element is a part of these
     return np.ascontiguousarray([admitted(group, each, f"{where}[{i}]").X for i, each in enumerate(several)])
 
 
@@ -132,7 +138,7 @@ def _weights(given: ArrayLike | None, count: int) -> Array:
 def _logarithms(group: MatrixGroup, X: Array, elements: Array, where: str) -> Array:
     """(N, n) log(X^-1 X_i)."""
     with np.errstate(all="ignore"):
-        logs = row_by_row(build(group).log, np.ascontiguousarray(np.linalg.inv(X) @ elements))[0]
+        logs = row_by_row(library_of(group).log, np.ascontiguousarray(np.linalg.inv(X) @ elements))[0]
     bad = np.flatnonzero(~np.all(np.isfinite(logs), axis=1))
     if bad.size:
         raise ComputationError(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ def _checked(group: MatrixGroup, X: ArrayLike) -> Array:
 
 
 def _nearest(group: MatrixGroup, X: Array) -> Array:
-    kind = closed_kind(group.basis, group.is_complex)
+    kind = _closed_of(group)
     if kind is not None:
         return _CLOSED[kind](X)
     best: tuple[float, Array] | None = None
@@ -104,6 +105,11 @@ def _nearest(group: MatrixGroup, X: Array) -> Array:
             f"nearest: no element of {group.name} is nearest to X; is its determinant negative or zero?"
         )
     return best[1]
+
+
+@lru_cache(maxsize=64)
+def _closed_of(group: MatrixGroup) -> str | None:
+    return closed_kind(group.basis, group.is_complex)
 
 
 def closed_kind(basis: Array, is_complex: bool) -> str | None:

@@ -13,7 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import ComputationError, InputError, NotFiniteError, ShapeError, SpreadWarning
 from lie_codegen.exact.counts import seeded
-from lie_codegen.groups.build import build
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.covariance import compounded, flowed, transported
@@ -120,7 +120,7 @@ class Uncertain(Saved):
             raise InputError(f"Uncertain.flow: noise does not run backwards; duration = {duration:g} is negative")
         Q = np.zeros((n, n)) if noise is None else _covariance(noise, n, "Uncertain.flow: noise")
         S = flowed(self.group.algebra.ad_matrices, velocity, float(duration), self.covariance, Q)
-        step = build(self.group).exp(np.ascontiguousarray(duration * velocity))
+        step = library_of(self.group).exp(np.ascontiguousarray(duration * velocity))
         shift = np.linalg.inv(self._adjoint(step)) @ self.mean_shift
         return Uncertain(self.group, self.X @ step, S, shift)
 
@@ -138,11 +138,11 @@ class Uncertain(Saved):
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0))
         xi = self.mean_shift + rng.normal(size=(count, self.group.dim)) @ root.T
-        moved: Array = self.X @ row_by_row(build(self.group).exp, np.ascontiguousarray(xi))[0]
+        moved: Array = self.X @ row_by_row(library_of(self.group).exp, np.ascontiguousarray(xi))[0]
         return moved
 
     def _adjoint(self, X: Array) -> Array:
-        return np.asarray(build(self.group).Ad(np.ascontiguousarray(X)))
+        return np.asarray(library_of(self.group).Ad(np.ascontiguousarray(X)))
 
     def _same(self, other: Uncertain, where: str) -> None:
         if not isinstance(other, Uncertain) or other.group != self.group:
@@ -165,7 +165,7 @@ def fuse(estimates: Sequence[Uncertain]) -> Uncertain:
     if not parts or not all(isinstance(each, Uncertain) and each.group == parts[0].group for each in parts):
         raise InputError("fuse: give one lc.Uncertain at least, all on one group")
     group = parts[0].group
-    lib = build(group)
+    lib = library_of(group)
     information = [_information(each, i) for i, each in enumerate(parts)]
     X = parts[int(np.argmax([np.trace(each) for each in information]))].X
     last, size = np.inf, np.inf
