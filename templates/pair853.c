@@ -281,8 +281,8 @@ static APART ptrdiff_t conclude(Pair *p, Course *c)
         settle(p, X, next);
         keep(p, X, next);
     }
+    settle(p, p->X, room.after);
     memcpy(p->y, room.after, (size_t)p->size * sizeof(double));
-    settle(p, p->X, p->y);
     if (c->ends) {
         p->t = p->times[p->next];
         p->t_low = 0.0;
@@ -448,15 +448,15 @@ EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
                 good &= fabs(after[i]) <= most * (p->atol + p->rtol * size_of(p, n + i, fabs(behind[i])));
             }
             if (good) {
-                memset(y, 0, (size_t)n * sizeof(double));
-                memcpy(y + n, behind, (size_t)rest * sizeof(double));
                 if (p->lift) {
-                    settle(p, X, y);
-                    express(p, NULL, y, X);
+                    settle(p, X, behind);
+                    express(p, NULL, behind, X);
                 } else {
                     memcpy(X, p->knot_X + b.centre * p->packed, (size_t)p->packed * sizeof(double));
                     settle(p, X, theta);
                 }
+                memset(y, 0, (size_t)n * sizeof(double));
+                memcpy(y + n, behind, (size_t)rest * sizeof(double));
                 continue;
             }
         }
@@ -483,20 +483,27 @@ static Pair only_last(const Pair *p, const double *start, const double *toleranc
     return run;
 }
 
-/* The largest |a - b|, or |a| alone; NaN where there is one. */
-static APART double largest(ptrdiff_t n, const double *a, const double *b)
+/* The largest |a - b| and the largest |a|; NaN where there is one. */
+static APART void compare(ptrdiff_t n, const double *a, const double *b, double *apart, double *size)
 {
-    double most[FOUR] = {0.0}, all[FOUR] = {0.0}; /* four at a time; a sum is NaN if a term is, and here nothing cancels */
-    for (ptrdiff_t i = 0; i < n; ++i) {
-        const double d = fabs(a[i] - (b ? b[i] : 0.0));
-        most[i % FOUR] = d > most[i % FOUR] ? d : most[i % FOUR];
-        all[i % FOUR] += d;
+    double off[FOUR] = {0.0}, far[FOUR] = {0.0}, all[FOUR] = {0.0}; /* four at a time; a sum is NaN if a term is, and of these none cancel */
+    for (ptrdiff_t i = 0; i < n; i += FOUR) {
+        const ptrdiff_t from = i + FOUR <= n ? i : n > FOUR ? n - FOUR : 0; /* the last four perhaps again */
+        const ptrdiff_t most = n < FOUR ? n : FOUR;
+        for (ptrdiff_t l = 0; l < most; ++l) {
+            const double d = fabs(a[from + l] - b[from + l]), x = fabs(a[from + l]);
+            off[l] = d > off[l] ? d : off[l];
+            far[l] = x > far[l] ? x : far[l];
+            all[l] += d;
+        }
     }
     for (int l = 1; l < FOUR; ++l) {
-        most[0] = most[l] > most[0] ? most[l] : most[0];
+        off[0] = off[l] > off[0] ? off[l] : off[0];
+        far[0] = far[l] > far[0] ? far[l] : far[0];
         all[0] += all[l];
     }
-    return all[0] != all[0] ? all[0] : most[0];
+    *apart = all[0] != all[0] ? all[0] : off[0];
+    *size = all[0] != all[0] ? all[0] : far[0];
 }
 
 /* The stages of a step of each of two runs of one system, in turn: neither waits for the other, and a processor has both under way. */
@@ -564,10 +571,8 @@ EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *toleranc
         runs[r].y_out = all->y_out;
         pair_between(both[r], runs[r].steps, most);
     }
-    found[0] = largest(elements, p->X_out, coarse.X_out);
-    found[1] = largest(vectors, p->y_out, coarse.y_out);
-    found[2] = largest(elements, p->X_out, NULL);
-    found[3] = largest(vectors, p->y_out, NULL);
+    compare(elements, p->X_out, coarse.X_out, found, found + 2);
+    compare(vectors, p->y_out, coarse.y_out, found + 1, found + 3);
     found[4] = (double)runs[0].steps;
     p->steps = runs[1].steps;
     p->rejected = runs[1].rejected;

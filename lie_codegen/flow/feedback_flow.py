@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
 from lie_codegen.flow.product_step import Move
 from lie_codegen.flow.second_kind_coordinates import second_kind
+from lie_codegen.flow.short_state import short_states
 from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.maps.element_pattern import varying_entries
 from lie_codegen.groups.matrix_group import MatrixGroup
@@ -130,12 +132,16 @@ def _compiled(
     rows, columns = np.array(varying_entries(group)).T
     packed = np.ascontiguousarray(X0[:, rows, columns])
     flat = packed.view(float) if group.is_complex else packed
-    closed = Move(group).derivation.closed_exponential
-    numbers = (eps[0],) if count == 1 else (eps,)
-    system = System(
-        library.feedback_rate, library.feedback_move, n, reach_of(group, closed=closed), tuple(map(np.asarray, numbers))
-    )
-    y0 = np.ascontiguousarray(np.concatenate([np.zeros((count, n)), g0], axis=1))
+    numbers, short = (np.asarray(eps[0] if count == 1 else eps),), short_states([group])
+    if short is not None:
+        system = System(
+            library.feedback_rate, library.feedback_move, short.size, inf, numbers, lift=library.feedback_lift,
+            quaternions=short.quaternions,
+        )  # fmt: skip
+    else:
+        reach = reach_of(group, closed=Move(group).derivation.closed_exponential)
+        system = System(library.feedback_rate, library.feedback_move, n, reach, numbers)
+    y0 = np.ascontiguousarray(np.concatenate([np.zeros((count, system.group)), g0], axis=1))
     try:
         run = integrate(
             system,
@@ -154,7 +160,7 @@ def _compiled(
     values = np.ascontiguousarray(run.X).view(complex) if group.is_complex else run.X
     X = np.broadcast_to(np.eye(group.degree, dtype=values.dtype), (*run.X.shape[:2], group.degree, group.degree)).copy()
     X[..., rows, columns] = values
-    g = run.y[..., n:]
+    g = run.y[..., system.group :]
     clock = np.repeat(times, count)
     place = X.reshape(-1, group.degree, group.degree) if law.reads == "X" else g.reshape(-1, n)
     u = row_by_row(library.feedback_value, clock, np.ascontiguousarray(place))[0].reshape(len(times), count, n)

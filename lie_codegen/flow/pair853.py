@@ -35,12 +35,12 @@ _RATIO = 16.0
 _SHORTER = _RATIO ** (-1 / 8)
 #: Times at which two runs of a single member of a steady system are compared: the longer steps need not end at all that were asked for.
 _COMPARED = 8
-#: An interpolated state may err so many times more than a step: once, where the errors of steps add up.
-_BETWEEN = 2.0
 #: Where steps go as they like the first run of a member has local errors of this part of the tolerance, by Theta and by elements: of hundred
 #: loops on SO(3) and SE(3) at 1e-5 to 1e-12 nine needed a third run with 1, none with 1/4, for a tenth more steps; by elements of
 #: three hundred on SO(3) four with 1/4, none with 1/8, for a fifteenth more.
 _FREE_SHARE, _FREE_SHARE_SHORT = 0.25, 0.125
+#: An interpolated state may err so many times more than a step: once, where the errors of steps add up. The same part of the tolerance for both.
+_BETWEEN, _BETWEEN_SHORT = 2.0, 4.0
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
@@ -69,6 +69,11 @@ class PairRun:
     knot_h: Array
     knot_X: Array
     knot_y: Array
+
+    def estimated(self, error: float) -> PairRun:
+        """The same with this estimate of its error."""
+        counts = self.steps, self.rejected, self.evaluations
+        return PairRun(self.X, self.y, *counts, error, self.knot_t, self.knot_h, self.knot_X, self.knot_y)
 
     def within(self, system: System, knots: NDArray[np.intp], parts: Array) -> tuple[Array, Array]:
         """X and y the fractions `parts` of the way through the steps `knots`, by fresh steps of a single member."""
@@ -125,7 +130,7 @@ def integrate(
     chosen = np.linspace(0, len(X0) - 1, some).astype(int)
     pilot, local = _to_tolerance(system.of_members(chosen), X0[chosen], y0[chosen], times, rtol, atol, where)
 
-    return replace(_many(system, X0, y0, times, *local, where, threads), error_estimate=pilot.error_estimate)
+    return _many(system, X0, y0, times, *local, where, threads).estimated(pilot.error_estimate)
 
 
 def _to_tolerance(
@@ -152,13 +157,14 @@ def _to_tolerance(
     if found is None:
         coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), *_local(rtol, atol, share), where)
         X, y, steps = coarse.X[1:], coarse.y[1:], coarse.steps
+    shorter = 1.0
     for _ in range(_MOST_RUNS):
         share /= _RATIO
         local = _local(rtol, atol, share)
         if free:  # where the reach limits steps two runs would be the same
-            system = replace(system, reach=system.reach * _SHORTER)
+            shorter *= _SHORTER
         if found is None:
-            fine = _once(system, X0, y0, times, *local, where)
+            fine = _once(system.within(shorter), X0, y0, times, *local, where)
             with np.errstate(invalid="ignore"):
                 difference = max(_size(fine.X[compared] - X), _size(fine.y[compared] - y))
             size = max(_size(fine.X), _size(fine.y))
@@ -174,16 +180,16 @@ def _to_tolerance(
         goal = max(rtol * scale, atol, floor)
         if estimate <= goal:
             if one:
-                return replace(fine, error_estimate=max(estimate, floor)), local
+                return fine.estimated(max(estimate, floor)), local
             slack = min(max(goal / (_MARGIN * max(estimate, floor)), 1 / _MARGIN), _RATIO)
             of_others = max(slack * local[0], _SMALLEST), max(slack * local[1], _SMALLEST)
-            return replace(fine, error_estimate=max(_MARGIN * slack * estimate, floor)), of_others
+            return fine.estimated(max(_MARGIN * slack * estimate, floor)), of_others
         if local[1] <= _SMALLEST:
             break
         needed = estimate / max(rtol * scale, atol)
         if needed > _RATIO**2:  # far off: the next pair starts there
             share /= min(needed / _RATIO, 1e4)
-            fine = _once(system, X0, y0, times, *_local(rtol, atol, share), where)
+            fine = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where)
         X, y, steps = fine.X[compared], fine.y[compared], fine.steps
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
@@ -279,7 +285,7 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
         given.knot_t, given.knot_h, given.knot_X, given.knot_y, given.knot_slope, given.knot_theta = (
             each.ctypes.data for each in kept
         )
-        library.pair_between(ctypes.addressof(given), given.steps, _BETWEEN)
+        library.pair_between(ctypes.addressof(given), given.steps, _between(system))
         kept = tuple(each[:-1] for each in kept[:4])
     return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, nan, *kept)
 
@@ -317,7 +323,7 @@ def _twice(
     given.room = _FIRST_STEPS
     given.X_out, given.y_out = X.ctypes.data + 8 * packed, y.ctypes.data + 8 * size
     status = compiled_pair().pair_twice(
-        ctypes.addressof(given), start, asked, _FIRST_STEPS, _BETWEEN, apart, other, found
+        ctypes.addressof(given), start, asked, _FIRST_STEPS, _between(system), apart, other, found
     )
     if status != DONE:
         return None
@@ -325,6 +331,10 @@ def _twice(
     knots_kept = _rows(block[places[9] :], rows, given.steps, (1, 1, kept, size))
     run = PairRun(X, y, given.steps, given.rejected, given.evaluations, nan, *knots_kept)
     return run, max(off_X, off_y), max(size_X, size_y), int(coarse)
+
+
+def _between(system: System) -> float:
+    return _BETWEEN if system.lift is None else _BETWEEN_SHORT
 
 
 def _rows(rows: Array, room: int, count: int, widths: tuple[int, ...]) -> tuple[Array, ...]:

@@ -84,6 +84,10 @@ class System:
         kept = [v[which] if self._is_own(k) else v for k, v in enumerate(self.numbers)]
         return replace(self, numbers=tuple(kept))
 
+    def within(self, part: float) -> System:
+        """The same with steps that go so much less far."""
+        return self if part == 1 else replace(self, reach=self.reach * part)
+
     @cached_property
     def work_size(self) -> int:
         """Doubles that a step of a single member works with, as templates/pair853.c lays them out."""
