@@ -36,12 +36,15 @@ def has_masks(values: Collection[Any]) -> bool:
     """
     if "numpy.ma" not in sys.modules:  # then nobody can have made one
         return False
-    masked = sys.modules["numpy.ma"]
+    masked, plain = sys.modules["numpy.ma"], sys.modules["numpy"].ndarray
     for value in values:
+        kind = type(value)
+        if kind in _WITHOUT_MASKS or (kind is plain and not value.dtype.hasobject):
+            continue
         if isinstance(value, _HOLDERS):
             if not _ARE_WITHOUT_MASKS(map(type, value.values() if isinstance(value, dict) else value)):
                 return _holds_masks(list(values))
-        elif type(value) not in _WITHOUT_MASKS and (_holds_others(value) or isinstance(value, masked.MaskedArray)):
+        elif _holds_others(value) or isinstance(value, masked.MaskedArray):
             return _holds_masks(list(values))
     return False
 

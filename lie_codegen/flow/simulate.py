@@ -99,20 +99,21 @@ def simulate(
         NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
         ComputationError: the tolerance is not reached with the steps that can be taken: 67 million; or u(t) is not resolved.
     """
-    options = {
-        "t": t, "eps": eps, "X0": X0, "rtol": rtol, "atol": atol, "tolerance": tolerance, "resolution": resolution,
-        "method": method, "steps": steps, "events": events, "threads": threads,
-    }  # fmt: skip
     single = check_precision("simulate", precision)
-    if single and (_is_simulated(group) or _is_simulated(u)):
-        raise InputError('simulate: precision="single" is for inputs, not for a plan')
-    if _is_simulated(group):
+    if _is_simulated(group) or _is_simulated(u):
+        if single:
+            raise InputError('simulate: precision="single" is for inputs, not for a plan')
+        options = {
+            "t": t, "eps": eps, "X0": X0, "rtol": rtol, "atol": atol, "tolerance": tolerance, "resolution": resolution,
+            "method": method, "steps": steps, "events": events, "threads": threads,
+        }  # fmt: skip
+        if not _is_simulated(group):
+            own = as_group(cast("GroupLike", group), "simulate")
+            return cast("Simulated", u).__simulate__(own, **options)
         if u is not None:
             raise InputError("simulate: a plan comes alone, or after its group")
         return group.__simulate__(None, **options)
     group = as_group(cast("GroupLike", group), "simulate")
-    if _is_simulated(u):
-        return u.__simulate__(group, **options)
     if u is None or t is None:
         raise InputError(f"simulate({group.name}): give {'an input u' if u is None else 'the times t'}")
     times = check_times(group, t)

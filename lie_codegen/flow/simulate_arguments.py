@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -88,11 +90,12 @@ def check_tolerance(where: str, rtol: float | None, atol: float, tolerance: floa
         raise InputError(f"{where}: give rtol, or its old name tolerance, not both")
     name, value = ("tolerance", tolerance) if tolerance is not None else ("rtol", rtol)
     goal = _DEFAULT if value is None else value
-    if not (isinstance(goal, int | float | np.floating) and np.isfinite(goal) and goal > 0):
+    usual = type(goal) is float and 0 < goal < inf
+    if not usual and not (isinstance(goal, int | float | np.floating) and np.isfinite(goal) and goal > 0):
         raise InputError(f"{where}: {name} must be positive, got {value!r}")
     if goal < _SMALLEST:
         raise InputError(f"{where}: {name} = {goal:g} is below {_SMALLEST:g}, which double precision does not reach")
-    if not (np.isfinite(atol) and atol >= 0):
+    if not (type(atol) is float and 0 <= atol < inf) and not (np.isfinite(atol) and atol >= 0):
         raise InputError(f"{where}: atol must not be negative, got {atol!r}")
     return float(goal)
 
@@ -106,6 +109,8 @@ def step_count(group: MatrixGroup, steps: Any) -> int:
 
 def factors_of(group: MatrixGroup, eps: ArrayLike) -> Array:
     """eps as a number or (N,) of them."""
+    if type(eps) is float and isfinite(eps):
+        return np.asarray(eps)
     try:
         factors = np.asarray(eps, dtype=float)
     except (TypeError, ValueError):
@@ -137,16 +142,24 @@ def check_times(group: MatrixGroup, t: ArrayLike) -> Array:
         InputError, ShapeError, NotFiniteError: they are none.
     """
     try:
-        times = np.asarray(t, dtype=float)
+        times = np.array(t, dtype=float)  # the run keeps them
     except (TypeError, ValueError):
         raise InputError(f"simulate({group.name}): t must be an array of numbers, got {t!r}") from None
     if times.ndim != 1 or len(times) < 2:
         raise ShapeError(f"simulate({group.name}): t has shape {times.shape}; give two or more times")
+    if (times[1:] > times[:-1]).all() and isfinite(times[0]) and isfinite(times[-1]):
+        return times
     if not np.isfinite(times).all():
         raise NotFiniteError(f"simulate({group.name}): t holds NaN or infinity")
-    if (times[1:] <= times[:-1]).any():
-        raise InputError(f"simulate({group.name}): t must increase strictly")
-    return times
+    raise InputError(f"simulate({group.name}): t must increase strictly")
+
+
+@lru_cache(maxsize=64)
+def _identity(group: MatrixGroup) -> Array:
+    """The identity, to which nobody writes."""
+    identity = np.eye(group.degree, dtype=group.basis.dtype)
+    identity.flags.writeable = False
+    return identity
 
 
 def initial_elements(group: MatrixGroup, X0: ArrayLike | None) -> Array:
@@ -158,7 +171,7 @@ def initial_elements(group: MatrixGroup, X0: ArrayLike | None) -> Array:
     kind = complex if group.is_complex else float
     d = group.degree
     if X0 is None:
-        return np.eye(d, dtype=kind)
+        return _identity(group)
     given = np.asarray(X0)
     if given.dtype.kind not in "biufc":
         raise ShapeError(f"simulate({group.name}): X0 must be a ({d}, {d}) array of numbers, got {X0!r}")

@@ -47,9 +47,10 @@ class FormulaInput(Saved):
         return counts[0] if counts else None
 
     @cached_property
-    def addresses(self) -> tuple[int, int, int, int]:
-        """Of cosines, sines, left and right, for compiled loops."""
-        return tuple(each.ctypes.data for each in (self.cosines, self.sines, self.left, self.right))  # type: ignore[return-value]
+    def addresses(self) -> tuple[int, int, int, int, int, int]:
+        """Of rates, rates_low, cosines, sines, left and right, for compiled loops."""
+        tables = self.rates, self.rates_low, self.cosines, self.sines, self.left, self.right
+        return tuple(each.ctypes.data for each in tables)  # type: ignore[return-value]
 
     @property
     def breakpoints(self) -> Array:

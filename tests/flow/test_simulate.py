@@ -271,3 +271,16 @@ def test_output_times_beside_a_jump(off: float) -> None:
     for method in ("auto", "rkmk4"):
         run = lc.simulate("so3", Jumps(), t=t, method=method, tolerance=1e-9)
         np.testing.assert_allclose(run.X[-1], wanted, atol=1e-12)
+
+
+def test_a_run_is_nobodys_memory() -> None:
+    t, X0 = np.linspace(0.0, 1.0, 3), np.eye(3)
+    run = lc.simulate("so3", [1.0, 0.0, 0.0], t=t, X0=X0)
+    alone = lc.simulate("so3", [1.0, 0.0, 0.0], t=t)
+    wanted = run.X.copy(), run.at(0.7)
+    t[:], X0[:] = 7.0, 7.0
+    alone.X[:] = 7.0  # nor is the identity that all begin with
+    np.testing.assert_array_equal(run.t, [0.0, 0.5, 1.0])
+    np.testing.assert_array_equal(run.X, wanted[0])
+    np.testing.assert_array_equal(run.at(0.7), wanted[1])
+    np.testing.assert_array_equal(lc.simulate("so3", [1.0, 0.0, 0.0], t=run.t).X, wanted[0])

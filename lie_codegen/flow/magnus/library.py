@@ -199,14 +199,16 @@ def _table_input(values: Array, projection: Array) -> Input:
 def read_by(drive: Drive, who: int) -> Input:
     """The drive of trajectory `who` as the C reads it; the drive's arrays have to stay."""
     formula = drive.formula
-    cosines, sines, left, right = formula.addresses
+    rate, rate_low, cosines, sines, left, right = formula.addresses
+    if drive.rates is not formula.rates:
+        rate, rate_low = drive.rates.ctypes.data, drive.rates_low.ctypes.data
     waves, lines = (table[0].size if table.ndim == 3 else 0 for table in (formula.cosines, formula.left))
     rate_stride = drive.rates.shape[-1] if drive.rates.ndim == 2 else 0
     factor_stride = int(len(drive.factor) > 1)
     times = drive.times
     return Input(
-        rates=drive.rates.shape[-1], wave_stride=waves, rate=drive.rates.ctypes.data + 8 * who * rate_stride,
-        rate_low=drive.rates_low.ctypes.data + 8 * who * rate_stride,
+        rates=drive.rates.shape[-1], wave_stride=waves, rate=rate + 8 * who * rate_stride,
+        rate_low=rate_low + 8 * who * rate_stride,
         rate_stride=rate_stride, cosines=cosines + 8 * who * waves, sines=sines + 8 * who * waves,
         times=times.ctypes.data if len(times) else None, left=left + 8 * who * lines, right=right + 8 * who * lines,
         line_stride=lines, terms=drive.terms, series=drive.series.ctypes.data if drive.terms else None, factor=drive.factor.ctypes.data + 8 * who * factor_stride,
