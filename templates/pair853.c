@@ -464,11 +464,11 @@ EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
     }
 }
 
-/* From the start, X then y, at this tolerance to the last time, which alone is wanted on the way. */
-static Pair only_last(const Pair *p, const double *start, const double *tolerance)
+/* From the start, X then y, at this tolerance; where states between steps are interpolated to the last time, which alone is wanted on the way. */
+static Pair from_start(const Pair *p, const double *start, const double *tolerance)
 {
     Pair run = *p;
-    const ptrdiff_t last = p->count - 1;
+    const ptrdiff_t ahead = p->knot_slope ? p->count - 1 : 0;
     memcpy(run.X, start, (size_t)p->packed * sizeof(double));
     memcpy(run.y, start + p->packed, (size_t)p->size * sizeof(double));
     pair_lift(&run);
@@ -476,10 +476,10 @@ static Pair only_last(const Pair *p, const double *start, const double *toleranc
     run.atol = tolerance[1];
     run.h = run.t_low = 0.0;
     run.next = run.steps = run.rejected = run.evaluations = 0;
-    run.times += last;
-    run.X_out += last * p->packed;
-    run.y_out += last * p->size;
-    run.count = 1;
+    run.times += ahead;
+    run.X_out += ahead * p->packed;
+    run.y_out += ahead * p->size;
+    run.count -= ahead;
     return run;
 }
 
@@ -535,12 +535,12 @@ EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *toleranc
     ptrdiff_t status[2];
     double **const parts[] = {&coarse.X, &coarse.y, &coarse.work, &coarse.dense, &coarse.knot_t, &coarse.knot_h, &coarse.knot_X, &coarse.knot_y, &coarse.knot_slope, &coarse.knot_theta};
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; ++k) {
-        *parts[k] += apart;
+        *parts[k] += *parts[k] ? apart : 0;
     }
     coarse.X_out = other;
     coarse.y_out = other + elements;
-    runs[0] = only_last(&coarse, start, tolerances);
-    runs[1] = only_last(p, start, tolerances + 2);
+    runs[0] = from_start(&coarse, start, tolerances);
+    runs[1] = from_start(p, start, tolerances + 2);
     runs[1].reach *= tolerances[4];
     for (int r = 0; r < 2; ++r) {
         begin(both[r], course + r);
@@ -569,7 +569,9 @@ EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *toleranc
         runs[r].count = p->count;
         runs[r].X_out = all->X_out;
         runs[r].y_out = all->y_out;
-        pair_between(both[r], runs[r].steps, most);
+        if (p->knot_slope) {
+            pair_between(both[r], runs[r].steps, most);
+        }
     }
     compare(elements, p->X_out, coarse.X_out, found, found + 2);
     compare(vectors, p->y_out, coarse.y_out, found + 1, found + 3);

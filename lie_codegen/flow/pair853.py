@@ -33,8 +33,6 @@ _PILOT, _LARGEST_PILOT, _PART, _MARGIN = 16, 128, 32, 16.0
 _RATIO = 16.0
 #: By so much its steps are shorter.
 _SHORTER = _RATIO ** (-1 / 8)
-#: Times at which two runs of a single member of a steady system are compared: the longer steps need not end at all that were asked for.
-_COMPARED = 8
 #: Where steps go as they like the first run of a member has local errors of this part of the tolerance, by Theta and by elements: of hundred
 #: loops on SO(3) and SE(3) at 1e-5 to 1e-12 nine needed a third run with 1, none with 1/4, for a tenth more steps; by elements of
 #: three hundred on SO(3) four with 1/4, none with 1/8, for a fifteenth more.
@@ -146,16 +144,12 @@ def _to_tolerance(
     one = len(X0) == 1
     free = one and system.is_interpolated and len(times) > 2  # steps go as they like, and all times cost little
     share = (_FREE_SHARE if system.lift is None else _FREE_SHARE_SHORT) if free else 1.0
-    # the last time and those a whole number of places before it, but for the first
-    apart = -(-(len(times) - 1) // _COMPARED) if one and system.steady and not free else 1
-    compared = slice((len(times) - 1) % apart or apart, None, apart)
-    found = (
-        _twice(system, X0, y0, times, (*_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO), _SHORTER))
-        if free
-        else None
-    )
+    found = None
+    if one:
+        both = (*_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO), _SHORTER if free else 1.0)
+        found = _twice(system, X0, y0, times, both)
     if found is None:
-        coarse = _once(system, X0, y0, np.concatenate([times[:1], times[compared]]), *_local(rtol, atol, share), where)
+        coarse = _once(system, X0, y0, times, *_local(rtol, atol, share), where)
         X, y, steps = coarse.X[1:], coarse.y[1:], coarse.steps
     shorter = 1.0
     for _ in range(_MOST_RUNS):
@@ -166,7 +160,7 @@ def _to_tolerance(
         if found is None:
             fine = _once(system.within(shorter), X0, y0, times, *local, where)
             with np.errstate(invalid="ignore"):
-                difference = max(_size(fine.X[compared] - X), _size(fine.y[compared] - y))
+                difference = max(_size(fine.X[1:] - X), _size(fine.y[1:] - y))
             size = max(_size(fine.X), _size(fine.y))
         else:
             fine, difference, size, steps = found
@@ -190,7 +184,7 @@ def _to_tolerance(
         if needed > _RATIO**2:  # far off: the next pair starts there
             share /= min(needed / _RATIO, 1e4)
             fine = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where)
-        X, y, steps = fine.X[compared], fine.y[compared], fine.steps
+        X, y, steps = fine.X[1:], fine.y[1:], fine.steps
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
@@ -297,17 +291,21 @@ def _twice(
 
     Returns:
         The second run, its largest difference to the first, its size, the steps of the first; None where one of them needs more
-        than the first room for knots, or fails: `_once` says how.
+        than the first room for knots and one to each time at which steps end, or fails: `_once` says how.
     """
+    between = system.is_interpolated and len(times) > 2
+    room = _FIRST_STEPS + (0 if between else len(times))
+    if room > _STEPS:
+        return None
     packed, size, kept, k = system.packed, system.size, system.kept, len(times)
-    state, rows = packed + size, _FIRST_STEPS + 1
+    state, rows = packed + size, room + 1
     given = system.record()
     # behind each other: the start, tolerances, found, times, the states of the run with longer steps; then of each of the two runs where it is,
     # what steps and interpolation work with, knots by columns
     common = (state, 5, 5, k - 1, (k - 1) * state)
     own = (
-        packed, size, system.work_size, system.between_size, rows, rows, rows * kept, rows * size, rows * size,
-        rows * system.turns,
+        packed, size, system.work_size, system.between_size if between else 0, rows, rows, rows * kept, rows * size,
+        *((rows * size, rows * system.turns) if between else ()),
     )  # fmt: skip
     apart, places = sum(own), [0, *accumulate((*common, *own))]
     block, X, y = np.empty(places[-1] + apart), np.empty((k, 1, packed)), np.empty((k, 1, size))
@@ -318,12 +316,14 @@ def _twice(
     start, asked, found, given.times, other, given.X, given.y, given.work, given.dense, *knots = [
         at + 8 * place for place in places[:-1]
     ]
-    given.knot_t, given.knot_h, given.knot_X, given.knot_y, given.knot_slope, given.knot_theta = knots
+    given.knot_t, given.knot_h, given.knot_X, given.knot_y = knots[:4]
+    if between:
+        given.knot_slope, given.knot_theta = knots[4:]
     given.t, given.longest, given.count = times[0], times[-1] - times[0], k - 1
-    given.room = _FIRST_STEPS
+    given.room = room
     given.X_out, given.y_out = X.ctypes.data + 8 * packed, y.ctypes.data + 8 * size
     status = compiled_pair().pair_twice(
-        ctypes.addressof(given), start, asked, _FIRST_STEPS, _between(system), apart, other, found
+        ctypes.addressof(given), start, asked, room, _between(system), apart, other, found
     )
     if status != DONE:
         return None
