@@ -40,6 +40,8 @@ _FREE_SHARE, _FREE_SHARE_SHORT = 0.25, 0.125
 #: An interpolated state may err so many times more than a step: once, where the errors of steps add up. The same part of the tolerance for both.
 _BETWEEN, _BETWEEN_SHORT = 2.0, 4.0
 _SMALLEST, _MOST_RUNS = 1e-15, 6
+#: Doubles of a line of memory: vectors that lie across two take longer.
+_LINE = 8
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
 
@@ -304,16 +306,19 @@ def _twice(
     # what steps and interpolation work with, knots by columns
     common = (state, 5, 5, k - 1, (k - 1) * state)
     own = (
-        packed, size, system.work_size, system.between_size if between else 0, rows, rows, rows * kept, rows * size,
+        system.work_size, packed, size, system.between_size if between else 0, rows, rows, rows * kept, rows * size,
         *((rows * size, rows * system.turns) if between else ()),
     )  # fmt: skip
-    apart, places = sum(own), [0, *accumulate((*common, *own))]
-    block, X, y = np.empty(places[-1] + apart), np.empty((k, 1, packed)), np.empty((k, 1, size))
+    places = [0, *accumulate((*common, *own))]
+    apart = -(-sum(own) // _LINE) * _LINE
+    block, X, y = np.empty(places[5] + 2 * apart + _LINE), np.empty((k, 1, packed)), np.empty((k, 1, size))
+    at = block.ctypes.data
+    lead = -(at // 8 + places[5]) % _LINE  # slopes of a stage begin with a line of memory
+    block, at = block[lead:], at + 8 * lead
     block[:packed], block[packed:state], block[state : state + 5] = X0[0], y0[0], tolerances
     block[places[3] : places[4]] = times[1:]
     X[0], y[0] = X0, y0
-    at = block.ctypes.data
-    start, asked, found, given.times, other, given.X, given.y, given.work, given.dense, *knots = [
+    start, asked, found, given.times, other, given.work, given.X, given.y, given.dense, *knots = [
         at + 8 * place for place in places[:-1]
     ]
     given.knot_t, given.knot_h, given.knot_X, given.knot_y = knots[:4]

@@ -73,7 +73,7 @@ def rotation_log(ops: Arithmetic, R: Sequence[Sequence[Scalar]]) -> Vector:
 def unit_log(ops: Arithmetic, q: Vector) -> Vector:
     """The rotation vector, |theta| <= pi, of a unit quaternion, or of one that is nearly so, over its length."""
     sign = ops.where(ops.less(q[0], 0), ops.constant(-1), ops.constant(1))
-    near = (3 - dot(q, q)) / 2
+    near = (3 - ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))) / 2
     return scaled(2 * sign * near * short_arc(ops, 1 - sign * near * q[0]), q[1:])
 
 
