@@ -194,19 +194,20 @@ def closed_loop(
         # the controller brings its own loop: it lives on a floor above this one
         chosen = {name: value for name, value in options.items() if value is not None}
         return mpc.simulate(X0, duration=float(times[-1] - times[0]), **chosen)
-    of_mpc = {
-        "values": values, "plant": plant, "plant_values": plant_values, "compensate": compensate, "substeps": substeps,
-    }  # fmt: skip
-    refuse(of_mpc, "without mpc=; these options are those of a controller of lc.mpc")
+    if not (values is None and plant is None and plant_values is None and compensate is None and substeps is None):
+        of_mpc = {
+            "values": values, "plant": plant, "plant_values": plant_values, "compensate": compensate, "substeps": substeps,
+        }  # fmt: skip
+        refuse(of_mpc, "without mpc=; these options are those of a controller of lc.mpc")
     if order is not None and law is None:
         raise InputError(
             "closed_loop: order says what a law commands, and there is none: give law=, or leave order away"
         )
     if method not in ("auto", "gauss"):
         raise InputError(f'closed_loop: method is "auto" or "gauss", given {method!r}')
-    loop = prepared(
-        method, group=group, law=law, inertia=inertia, reference=reference, t=t, rtol=rtol, tolerance=tolerance, step=step,
-        sample=sample, delay=delay, noise=noise, limits=limits, disturbance=disturbance, external=external, observer=observer,
-        gains=gains, order=order,
-    )  # fmt: skip
-    return loop_by(method, loop, X0, xi0, states or {}, seed, runs, first, threads, events)
+    arguments = {
+        "group": group, "law": law, "inertia": inertia, "reference": reference, "t": t, "rtol": rtol, "tolerance": tolerance,
+        "step": step, "sample": sample, "delay": delay, "noise": noise, "limits": limits, "disturbance": disturbance,
+        "external": external, "observer": observer, "gains": gains, "order": order,
+    }  # fmt: skip
+    return loop_by(method, prepared(method, arguments), X0, xi0, states or {}, seed, runs, first, threads, events)

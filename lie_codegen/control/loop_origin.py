@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -109,7 +109,7 @@ def loop_origin(making: LoopMaking, kind: str) -> LoopOrigin | None:
 
 def run_in_steps(run: Run, model: Mapping[str, Any], reference: Any) -> Run:
     """The same loop by equal steps: without a compiler, and as C to take home."""
-    return replace(run, library=loop_library(model, reference, "continuous")[1], system=None)
+    return run._replace(library=loop_library(model, reference, "continuous")[1], system=None)
 
 
 def narrower(run: Run, loops: Array) -> Run:
@@ -119,7 +119,7 @@ def narrower(run: Run, loops: Array) -> Run:
         name: np.ascontiguousarray(value[loops]) if value.ndim > ranks[name] else value
         for name, value in run.numbers.items()
     }
-    return replace(run, start=np.ascontiguousarray(run.start[loops]), numbers=numbers)
+    return run._replace(start=np.ascontiguousarray(run.start[loops]), numbers=numbers)
 
 
 def _read(text: str) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,7 @@ def _quiet(run: Run) -> Run:
     for name, value in run.numbers.items():
         first = value[0] if value.ndim > ranks[name] else value
         numbers[name] = np.zeros_like(first) if name in SIGMAS.values() else first
-    return replace(run, start=np.ascontiguousarray(run.start[:1]), numbers=numbers, many=False)
+    return run._replace(start=np.ascontiguousarray(run.start[:1]), numbers=numbers, many=False)
 
 
 def _view(run: Run, parts: int, package: str, real: str, own: list[Kernel], moving: list[Kernel]) -> dict[str, Any]:

@@ -66,7 +66,7 @@ class _WarnedError(Exception):
         self.made = made
 
 
-def prepared(method: str, **arguments: Any) -> Prepared:
+def prepared(method: str, arguments: Mapping[str, Any]) -> Prepared:
     """The loop of these arguments of `loop_arguments`, prepared now or before.
 
     Raises:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +28,7 @@ _BLOCK = 20_000
 _WATCHED = 64
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """A loop to be run.
 
     Attributes:
@@ -52,10 +50,10 @@ class Run:
     times: Array
     numbers: Mapping[str, Array]
     threads: int
-    sample: float = 0.0
-    delay: int = 0
-    noise: NoiseStream = field(default_factory=lambda: NoiseStream(0, np.zeros(0, dtype=np.uint32)))
-    system: System | None = None
+    sample: float
+    delay: int
+    noise: NoiseStream
+    system: System | None
 
     def states(self, every: int) -> Array:
         """(k, N, m) or (k, m) states at the times; `every` steps between two times, or between two samples."""

@@ -10,8 +10,8 @@ With kappa = max(1, |X| |X^-1|), the sizes of the largest entries, and `defect` 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,8 +30,7 @@ NEAR_GROUP = 1e-5
 _DOUBTFUL = 5 * NEAR_GROUP
 
 
-@dataclass(frozen=True)
-class Admitted:
+class Admitted(NamedTuple):
     """An element, and how far what was given was from it.
 
     Attributes:
