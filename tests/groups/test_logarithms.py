@@ -266,7 +266,7 @@ def test_known_answers_come_back_with_the_conditioning_of_the_inverse_jacobian()
 
 
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow"]
-SANITIZE = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+SANITIZE = ["-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 DRIVER = """#include <math.h>
 #include <stdio.h>
 #include "{name}.h"
@@ -285,7 +285,6 @@ int main(void)
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc and its sanitizers")
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["su3", "sp4", "so5"])
 def test_the_c_of_iterated_logarithms_is_strict_and_sound_on_anything(name: str, tmp_path: Path) -> None:
     """NaN, infinity, zero and singular matrices, Jordan blocks, tiny and huge ones, under the sanitizers of gcc."""

@@ -29,7 +29,7 @@ STRICT = (
     "-Wno-sign-conversion",
 )  # fmt: skip
 ONE_LANE = ("-DLIE_CODEGEN_ONE_LANE",)
-SANITIZED = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+SANITIZED = ("-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 CORTEX = ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16")
 ZIG = ("aarch64-linux-musl", "riscv64-linux-musl", "wasm32-wasi", "x86_64-windows-gnu")
 CPPCHECK = (

@@ -365,7 +365,7 @@ def test_the_driver_is_clean_under_the_sanitizers(compiler: str, tmp_path: Path)
         "-Wall",
         "-Wextra",
         "-Werror",
-        "-fsanitize=address,undefined",
+        "-fsanitize=address,undefined,float-cast-overflow",
         "-fno-sanitize-recover=all",
     ]
     command = [compiler, *flags, f"-I{template_folder()}", "main.c", "-lm", "-o", "main"]
