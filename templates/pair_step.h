@@ -110,11 +110,12 @@ static int pair_step(Slope slope, const void *who, ptrdiff_t n, double t, const 
     {                                                                                               \
         enum { PARTS = WIDTH * sizeof(double) / sizeof(TYPE) };                                     \
         TYPE e5[PARTS], e3[PARTS];                                                                  \
-        int s, l;                                                                                   \
+        int u, l;                                                                                   \
         for (l = 0; l < PARTS; ++l) {                                                               \
             e5[l] = e3[l] = (TYPE){0.0};                                                            \
         }                                                                                           \
-        for (s = 0; s < STAGES; ++s) {                                                              \
+        for (u = 0; u < USES[STAGES]; ++u) { /* the others have weight 0 */                         \
+            const int s = USED[STAGES][u];                                                          \
             const TYPE *from = (const TYPE *)(k + s * n);                                           \
             for (l = 0; l < PARTS; ++l) {                                                           \
                 e5[l] += E5[s] * from[l];                                                           \
@@ -153,8 +154,9 @@ static APART void pair_errors(const double *k, ptrdiff_t n, double *five, double
  */
 static double pair_error(double five, double three, double h, ptrdiff_t n)
 {
-    const double down = five + 0.01 * three;
-    return down > 0.0 ? fabs(h) * five / sqrt(down * (double)n) : down;
+    const double down = five + 0.01 * three, safe = down > 0.0 ? down : 1.0;
+    const double error = fabs(h) * five / sqrt(safe * (double)n); /* computed in any case: so lanes need no branches */
+    return down > 0.0 ? error : down;
 }
 
 #endif
