@@ -16,6 +16,10 @@ from lie_codegen.runtime.rows import row_by_row
 
 #: Of the random starts.
 _SEED = 20
+#: The distance to X, relative to its size, from which Newton's steps double the digits.
+_ARRIVED = 1e-9
+#: Entries of M(g) up to which it is well enough conditioned to be inverted as it is.
+_INSIDE = 1e6
 
 
 def element_coordinates(group: MatrixGroup, X: ArrayLike) -> Array:
@@ -61,12 +65,25 @@ def second_kind(group: GroupLike, X: ArrayLike) -> Array:
 
 
 def _damped(group: MatrixGroup, g: Array, target: Array) -> Array:
-    """Gauss-Newton on |Phi(g) - X|^2 with Levenberg's damping, for all starts at once; then Newton."""
+    """Gauss-Newton on |Phi(g) - X|^2 with Levenberg's damping, for all starts at once; then Newton.
+
+    Those that have arrived wait for Newton, who brings them from there to rounding.
+    """
     lib = integrators(group)
+    arrived = _ARRIVED**2 * max(1.0, float(np.max(np.abs(target)))) ** 2
+    ends, still = g.copy(), np.arange(len(g))
     damping = np.full(len(g), 1e-2)
     residual, columns = _linearised(group, g, target)
     cost = np.sum(residual**2, axis=1)
     for _ in range(40):
+        far = ~(cost <= arrived)
+        if not np.all(far):
+            ends[still[~far]] = g[~far]
+            still, g, damping, residual, columns, cost = (
+                each[far] for each in (still, g, damping, residual, columns, cost)
+            )
+            if not len(still):
+                break
         normal = np.einsum("kri,krj->kij", columns, columns) + damping[:, None, None] * np.eye(group.dim)
         step = np.linalg.solve(normal, -np.einsum("kri,kr->ki", columns, residual)[..., None])[..., 0]
         trial = g + step
@@ -78,8 +95,22 @@ def _damped(group: MatrixGroup, g: Array, target: Array) -> Array:
         damping = np.clip(np.where(better, damping / 4, damping * 8), 1e-14, 1e8)
         residual, columns = _linearised(group, g, target)
         cost = np.sum(residual**2, axis=1)
+    ends[still] = g
     with np.errstate(all="ignore"):
-        return newton(group, g, np.broadcast_to(target, (len(g), *target.shape)))
+        return newton(group, ends, np.broadcast_to(target, (len(ends), *target.shape)))
+
+
+def _inverses(M: Array) -> Array:
+    """(k, n, n) M(g)^-1; at the ends of a chart, where M is infinite or nearly, what is left of it by singular values."""
+    with np.errstate(all="ignore"):
+        inside = np.max(np.abs(M), axis=(1, 2)) < _INSIDE
+        found = np.empty_like(M)
+        try:
+            found[inside] = np.linalg.inv(M[inside])
+        except np.linalg.LinAlgError:  # of rounding, for M^-1 is finite
+            inside[:] = False
+        found[~inside] = np.linalg.pinv(np.nan_to_num(M[~inside], posinf=0, neginf=0))
+    return found
 
 
 def _linearised(group: MatrixGroup, g: Array, target: Array) -> tuple[Array, Array]:
@@ -87,11 +118,7 @@ def _linearised(group: MatrixGroup, g: Array, target: Array) -> tuple[Array, Arr
     lib = integrators(group)
     phi = row_by_row(lib.product_exp, np.ascontiguousarray(g))[0]
     difference = (phi - target).reshape(len(g), -1)
-    with np.errstate(all="ignore"):
-        inverse = np.linalg.pinv(
-            np.nan_to_num(row_by_row(lib.wei_norman_matrix, np.ascontiguousarray(g))[0], posinf=0, neginf=0)
-        )
-    directions = group.hat(np.swapaxes(inverse, 1, 2))
+    directions = group.hat(np.swapaxes(_inverses(row_by_row(lib.wei_norman_matrix, np.ascontiguousarray(g))[0]), 1, 2))
     moved = (phi[:, None] @ directions).reshape(len(g), group.dim, -1)
     residual = np.concatenate([difference.real, difference.imag], axis=1)
     columns = np.concatenate([moved.real, moved.imag], axis=2).swapaxes(1, 2)

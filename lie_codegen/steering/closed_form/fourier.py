@@ -67,10 +67,15 @@ class Family:
             B[sin, 0], B[0, sin] = 1 / w, -1 / w
         return B
 
+    @cached_property
+    def _brackets(self) -> Array:
+        """(m, m, n) structure constants of the controls."""
+        return np.asarray(self.group.algebra.structure_constants[np.ix_(self.controls, self.controls)])
+
     def averaged(self, c: Array) -> tuple[Array, Array]:
         """log X(1) to second order, (n,), and its derivative by c, (n, m (1 + 2 K))."""
         rows = c.reshape(self.shape)
-        gamma = self.group.algebra.structure_constants[np.ix_(self.controls, self.controls)]
+        gamma = self._brackets
         moved = rows @ self._area_forms.T
         areas = rows @ self._area_forms @ rows.T
         value = np.einsum("ij,ijk->k", areas, gamma) / 2

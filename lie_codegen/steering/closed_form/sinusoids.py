@@ -141,7 +141,8 @@ def _flown(y: Array, u1: Any, u2: Any, phase: float) -> Array:
     A = np.zeros((len(s), n + 1, n + 1))  # of (y, 1)
     A[:, 0, n] = u2(s)
     A[:, range(1, n), range(n - 1)] = -np.reshape(u1(s), (-1, 1))
-    state = np.append(y, 1.0)
-    for step in propagators(A, phase / _STEPS):
-        state = step @ state
-    return state[:n]
+    parts = propagators(A, phase / _STEPS)
+    while len(parts) > 1:  # two neighbours at a time, the later on the left
+        even = len(parts) // 2 * 2
+        parts = np.concatenate([parts[1:even:2] @ parts[:even:2], parts[even:]])
+    return np.asarray((parts[0] @ np.append(y, 1.0))[:n])
