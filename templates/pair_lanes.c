@@ -35,7 +35,7 @@ typedef struct {
     ptrdiff_t begun;                              /* members that have been given a lane, of the first half for both */
     ptrdiff_t steps, rejected, evaluations;       /* of all members together; of eight at a time */
     double stopped;                               /* the time of the member that cannot go on */
-    double t[WIDE], t_low[WIDE], h[WIDE];         /* of lanes; h = 0: not known yet */
+    double t[WIDE], t_low[WIDE], h[WIDE], goal[WIDE]; /* of lanes; h = 0: not known yet; the next wanted time */
     ptrdiff_t member[WIDE], next[WIDE], tries[WIDE]; /* member -1: the lane stands still */
 } Lanes;
 
@@ -111,6 +111,7 @@ static void enter(Lanes *p, ptrdiff_t lane, ptrdiff_t member)
     }
     p->t[lane] = p->times[0];
     p->t_low[lane] = p->h[lane] = 0.0;
+    p->goal[lane] = p->times[1];
     p->next[lane] = p->tries[lane] = 0;
     p->member[lane] = member;
 }
@@ -189,12 +190,16 @@ static void slope(Lanes *p, int s, const double *h)
     rates(p, room.after, t, room.k + s * WIDE * p->size);
 }
 
-/* The length of a lane's next step, at most to the next time; whether it ends there. */
-static double cut(const Lanes *p, int l, int *ends)
+/* The lengths of the next steps, at most to the next times, 0 of lanes that stand still; whether they end there. Without branches. */
+static APART void cut(const Lanes *p, double *lengths, int *ends)
 {
-    const double gap = p->times[p->next[l] + 1] - p->t[l] - p->t_low[l], h = p->h[l];
-    *ends = gap <= h * (1 + 1e-10);
-    return *ends ? gap : gap < 1.9 * h ? 0.5 * gap : h; /* not a step and a crumb */
+    for (int l = 0; l < WIDE; ++l) {
+        const double gap = p->goal[l] - p->t[l] - p->t_low[l], h = p->h[l];
+        const double before = gap < 1.9 * h ? 0.5 * gap : h; /* not a step and a crumb */
+        const double length = gap <= h * (1 + 1e-10) ? gap : before;
+        lengths[l] = p->member[l] < 0 ? 0.0 : length;
+        ends[l] = gap <= h * (1 + 1e-10);
+    }
 }
 
 /* Squares of entries over what is allowed; of entries of Theta, which are those of X, the size is one, of elements at least one. */
@@ -251,44 +256,66 @@ static APART void judge(const Lanes *p, const double *h, double *error, double *
     }
 }
 
-/* Whether a lane's step of length h is taken; if it is not, the next is shorter. `why` it cannot be shorter, or DONE. */
-static int accepted(Lanes *p, int l, double h, double error, double growth, double angle, int *why)
+/* Which lanes take their steps, and how many; all that work have tried once more, the one that tried most so many times. Without branches. */
+static APART int accepted(Lanes *p, const double *error, const double *angle, int *take, ptrdiff_t *tried)
+{
+    const double far = p->reach * p->reach;
+    ptrdiff_t most = 0;
+    int taken = 0;
+    for (int l = 0; l < WIDE; ++l) {
+        const int works = p->member[l] >= 0;
+        take[l] = works & (error[l] <= 1.0) & (angle[l] <= far);
+        taken += take[l];
+        p->tries[l] += works;
+        most = p->tries[l] > most ? p->tries[l] : most;
+    }
+    *tried = most;
+    return taken;
+}
+
+/* A lane whose step of length h is not taken: the next is shorter. DONE, or why it cannot be. */
+static ptrdiff_t refuse(Lanes *p, int l, double h, double error, double growth, double angle)
 {
     const int runs = error <= 1e300, far = runs && angle > p->reach * p->reach;
-    if (error <= 1.0 && !far) {
-        return 1;
-    }
     /* Theta grows about as h does: the first length ends at 0.9 of its reach */
     const double factor = far ? 0.9 * p->reach / sqrt(angle) : growth;
     ++p->rejected;
     p->h[l] = shorter(h, factor);
-    if (vanishes(p->h[l], p->t[l])) {
-        *why = runs ? STUCK : LOST;
-    }
-    return 0;
+    return !vanishes(p->h[l], p->t[l]) ? DONE : runs ? STUCK : LOST;
 }
 
-/* A lane behind a step of length h: its time, its output, the length of the next. */
-static void go_on(Lanes *p, int l, double h, double growth, int ends)
+/* Lanes behind steps of these lengths that they take: their times and the lengths of the next. Without branches. */
+static APART void go_on(Lanes *p, const double *h, const double *growth, const int *take, const int *ends)
+{
+    for (int l = 0; l < WIDE; ++l) {
+        const double next = next_length(h[l], p->h[l], growth[l]);
+        double t = p->t[l], low = p->t_low[l];
+        later(&t, &low, h[l]);
+        t = ends[l] ? p->goal[l] : t;
+        low = ends[l] ? 0.0 : low;
+        p->h[l] = take[l] ? next : p->h[l];
+        p->t[l] = take[l] ? t : p->t[l];
+        p->t_low[l] = take[l] ? low : p->t_low[l];
+    }
+}
+
+/* A lane at a wanted time: its output, and the next wanted time, or it stands still. */
+static void put_out(Lanes *p, int l)
 {
     const Room room = room_of(p);
-    ++p->steps;
-    p->h[l] = next_length(h, p->h[l], growth);
-    if (ends) {
-        const ptrdiff_t at = p->next[l] * p->row + p->member[l];
-        get(p->y_out + at * p->size, l, room.y, p->size);
-        if (p->lift) {
-            const double *in[1] = {p->y_out + at * p->size};
-            double *out[1] = {p->X_out + at * p->packed};
-            p->move(in, out);
-        } else {
-            get(p->X_out + at * p->packed, l, room.X, p->packed);
-        }
-        p->t[l] = p->times[++p->next[l]];
-        p->t_low[l] = 0.0;
-        p->member[l] = p->next[l] < p->count ? p->member[l] : -1;
+    const ptrdiff_t at = p->next[l] * p->row + p->member[l];
+    get(p->y_out + at * p->size, l, room.y, p->size);
+    if (p->lift) {
+        const double *in[1] = {p->y_out + at * p->size};
+        double *out[1] = {p->X_out + at * p->packed};
+        p->move(in, out);
     } else {
-        later(p->t + l, p->t_low + l, h);
+        get(p->X_out + at * p->packed, l, room.X, p->packed);
+    }
+    if (++p->next[l] < p->count) {
+        p->goal[l] = p->times[p->next[l] + 1];
+    } else {
+        p->member[l] = -1;
     }
 }
 
@@ -341,32 +368,38 @@ static void set_out(Lanes *p, double *h, int *ends)
     const Room room = room_of(p);
     rates(p, room.y, p->t, room.k);
     for (int l = 0; l < WIDE; ++l) {
-        p->h[l] = p->h[l] > 0.0 ? p->h[l] : first_step(p->size, WIDE, room.y + l, room.k + l);
-        h[l] = p->member[l] < 0 ? 0.0 : cut(p, l, ends + l);
+        if (!(p->h[l] > 0.0)) {
+            p->h[l] = first_step(p->size, WIDE, room.y + l, room.k + l);
+        }
     }
+    cut(p, h, ends);
 }
 
 /* All stages are there: the steps that are good enough are taken. DONE, or why a member cannot go on. */
 static ptrdiff_t arrive(Lanes *p, const double *h, const int *ends)
 {
     double error[WIDE], growth[WIDE], angle[WIDE];
-    int take[WIDE], taken = 0, why = DONE;
+    int take[WIDE], taken;
+    ptrdiff_t tried;
     judge(p, h, error, angle, growth);
-    for (int l = 0; l < WIDE; ++l) {
-        const int works = p->member[l] >= 0;
-        take[l] = works && accepted(p, l, h[l], error[l], growth[l], angle[l], &why);
-        taken += take[l];
-        if (works && (why != DONE || ++p->tries[l] > p->most)) {
-            p->stopped = p->t[l];
-            return why != DONE ? why : MANY;
+    taken = accepted(p, error, angle, take, &tried);
+    for (int l = 0; l < WIDE && (taken < WIDE || tried > p->most); ++l) {
+        if (p->member[l] >= 0) {
+            const ptrdiff_t status = take[l] ? DONE : refuse(p, l, h[l], error[l], growth[l], angle[l]);
+            if (status != DONE || p->tries[l] > p->most) {
+                p->stopped = p->t[l];
+                return status != DONE ? status : MANY;
+            }
         }
     }
     if (taken) {
         settle(p, take, taken == WIDE);
     }
+    p->steps += taken;
+    go_on(p, h, growth, take, ends);
     for (int l = 0; l < WIDE; ++l) {
-        if (take[l]) {
-            go_on(p, l, h[l], growth[l], ends[l]);
+        if (take[l] && ends[l]) {
+            put_out(p, l);
         }
     }
     return DONE;

@@ -36,7 +36,7 @@ class Lanes(ctypes.Structure):
         *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "work")),
         *((n, ctypes.c_ssize_t) for n in ("most", "begun", "steps", "rejected", "evaluations")),
         ("stopped", ctypes.c_double),
-        *((n, ctypes.c_double * WIDE) for n in ("t", "t_low", "h")),
+        *((n, ctypes.c_double * WIDE) for n in ("t", "t_low", "h", "goal")),
         *((n, ctypes.c_ssize_t * WIDE) for n in ("member", "next", "tries")),
     ]  # fmt: skip
 
