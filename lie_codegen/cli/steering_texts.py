@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.errors import ExpressionError, InputError, ShapeError
 
 if TYPE_CHECKING:
     from lie_codegen.groups.matrix_group import MatrixGroup
@@ -23,11 +23,14 @@ def numbers(text: str, option: str, labels: Sequence[str] = ()) -> list[float]:
 
     Raises:
         ShapeError: not real, or not as many as labels.
-        ExpressionError: naming the column.
+        ExpressionError: naming the option, the column and the text.
     """
     from lie_codegen.exact.expression import parse_number
 
-    values = [parse_number(part) for part in text.split(",")]
+    try:
+        values = [parse_number(part) for part in text.split(",")]
+    except ExpressionError as error:
+        raise ExpressionError(f"steer: {option}: {error}") from None
     if (labels and len(values) != len(labels)) or any(value.is_real is not True for value in values):
         wanted = f"{len(labels)} real numbers for {', '.join(labels)}" if labels else "real numbers, comma-separated"
         raise ShapeError(f"steer: {option} needs {wanted}, got {text!r}")

@@ -85,7 +85,7 @@ def test_a_bad_group_file_is_refused_with_status_2_and_one_line(cli, case: str, 
     [
         (("--target", "0.1,0.2,0.3", "--controls", "w1"), "growth vector (1)"),
         (("--target", "0.1,0.2", "--controls", "w1,w2"), "needs 3 real numbers"),
-        (("--target", "0.1,0.2,nan", "--controls", "w1,w2"), "'nan'"),
+        (("--target", "0.1,0.2,nan", "--controls", "w1,w2"), "--target: column 1: no name 'nan'"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w9"), "'w9'"),
         (("--target", "0.1,0.2,0.3", "--controls", "w1,w2", "--duration", "0"), "duration"),
         (("--target", "0.1,0,0.3", "--controls", "w1,w2,w3", "--method", "four_phase"), "exactly two controls"),
