@@ -125,7 +125,7 @@ class SteeringError(ComputationError):
 
 
 class InfeasibleError(SteeringError):
-    """No controls within the bounds reach the goal in the time: proved.
+    """No controls within the bounds reach the goal in the time, or an obstacle holds a state that is prescribed: proved.
 
     Attributes:
         certificate: the proof, with what is needed and the most there can be.

@@ -15,7 +15,12 @@ import lie_codegen as lc
 from lie_codegen.codegen.package import render_library
 
 X86 = platform.machine() in ("x86_64", "AMD64")
-SANITIZE = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g1"]
+SANITIZE = [
+    "-fsanitize=address,undefined,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+    "-fno-omit-frame-pointer",
+    "-g1",
+]
 #: The strides of a batch are sizes of ports: (kernel, sizes of the inputs, sizes of the outputs).
 DRIVER = """
 #include "toy_binding.c"

@@ -24,7 +24,13 @@ from lie_codegen.codegen.package import render_library
 from lie_codegen.steering.shooting.package import render_steering_package
 
 CORPUS = Path(__file__).with_name("corpus") / "fuzzed_c.json"
-FLAGS = ("-std=c11", "-O1", "-g", "-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+FLAGS = (
+    "-std=c11",
+    "-O1",
+    "-g",
+    "-fsanitize=fuzzer,address,undefined,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+)
 TARGETS = ("so2", "so3", "se3", "su2", "so3_steer")
 TEXTS = ("group files", "formulas", "Lagrangians")
 

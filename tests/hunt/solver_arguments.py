@@ -10,7 +10,12 @@ import lie_codegen as lc
 from lie_codegen.steering.shooting.package import render_steering_package
 
 COMPILER = shutil.which("gcc") or shutil.which("cc")
-SANITIZE = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g1")
+SANITIZE = (
+    "-fsanitize=address,undefined,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+    "-fno-omit-frame-pointer",
+    "-g1",
+)
 #: Each line of options, weights and the target is one fault; a good target stands beside the bad one.
 DRIVER = r"""
 #include "PREFIX.h"

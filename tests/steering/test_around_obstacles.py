@@ -204,8 +204,10 @@ def test_what_the_direct_method_has_not_among_obstacles_is_refused() -> None:
     for more in ({"pieces": 20}, {"objective": "time"}):
         with pytest.raises(lc.errors.SteeringInputError, match="obstacles"):
             lc.steer(se2, (0, 4.0, 0), ("omega", "vx"), 4.0, **given, **more)
-    with pytest.raises(lc.errors.SteeringError, match="target itself is inside obstacle 1"):
+    with pytest.raises(lc.errors.InfeasibleError, match="target itself is inside obstacle 1") as refused:
         lc.steer(se2, (0, 2.1, 0), ("omega", "vx"), 4.0, **given)
+    assert refused.value.certificate.place == "target"
+    assert refused.value.certificate.clearance == pytest.approx(0.1**2 - 0.5**2)
 
 
 @pytest.mark.slow

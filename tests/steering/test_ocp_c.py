@@ -62,7 +62,11 @@ def run(problem: Any, folder: Path, real: str, parameters: str, *flags: str) -> 
     return done.stdout.split()
 
 
-SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=undefined", "-fno-sanitize=float-divide-by-zero")
+SANITIZERS = (
+    "-fsanitize=address,undefined,float-cast-overflow",
+    "-fno-sanitize-recover=undefined",
+    "-fno-sanitize=float-divide-by-zero",
+)
 SYSTEMS = {
     "car": (car, ", ".join(map(repr, planar(0.8, 3, 1).ravel().tolist())), 0.277507734),
     "quadrotor": (quadrotor, "2, 0, 1, 1, 0.05, 0.4", 6.119001823),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import lie_codegen as lc
-from lie_codegen.errors import SteeringError, SteeringInputError
+from lie_codegen.errors import InfeasibleError, SteeringError, SteeringInputError
 from lie_codegen.steering.constraints import Ball, Cone
 from lie_codegen.steering.plan import Plan
 
@@ -106,7 +106,7 @@ def test_limits_that_cannot_be_met_are_named() -> None:
     with pytest.raises(SteeringError, match="times the bound of w1"):
         lc.steer(lc.group("so3"), G, ("w1", "w2"), 1.0, bounds={"w1": 0.05}, intervals=8, starts=1)
     inside = Cone((0, 0, 1), (0, 0, 1), 0.1)
-    with pytest.raises(SteeringError, match="start itself is inside obstacle 1"):
+    with pytest.raises(InfeasibleError, match="start itself is inside obstacle 1"):
         lc.steer(
             lc.group("so3"), [1e-3, 0, 0.3], ("w1", "w2"), 1.0, bounds=1e-2, obstacles=[inside], intervals=16, starts=1
         )

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lie_codegen as lc
-from lie_codegen.errors import SteeringError, SteeringInputError, UncontrollableError
+from lie_codegen.errors import InfeasibleError, SteeringError, SteeringInputError, UncontrollableError
 from lie_codegen.steering.accessibility import with_drift
 from lie_codegen.steering.constraints import Ball
 from lie_codegen.steering.packing import pack_element
@@ -172,9 +172,9 @@ def test_the_limit_in_the_way_is_named(options: dict[str, object], words: str) -
 
 def test_ends_inside_an_obstacle_are_refused_at_once_by_the_users_number() -> None:
     group = lc.group("se2")
-    with pytest.raises(SteeringError, match="target itself is inside obstacle 2"):
+    with pytest.raises(InfeasibleError, match="target itself is inside obstacle 2"):
         lc.steer(group, (0, 1.0, 0), (0, 1), 1.0, obstacles=[Ball((5, 5), 1.0), Ball((1, 0), 0.3)])
-    with pytest.raises(SteeringError, match="via point 1 itself is inside obstacle 1"):
+    with pytest.raises(InfeasibleError, match="via point 1 itself is inside obstacle 1"):
         lc.steer(group, (0, 1.0, 0), (0, 1), 1.0, obstacles=[Ball((0.5, 0.5), 0.2)], via=[(0.5, (0, 0.5, 0.5))])
 
 

@@ -128,5 +128,5 @@ def test_what_torques_among_obstacles_need_is_said() -> None:
         lc.steer("se2", ahead(), ("omega", "vx"), 6.0, inertia=1, objective="time", **given)
     with pytest.raises(lc.errors.SteeringInputError, match="has no option rest"):
         lc.steer("se2", ahead(), ("omega", "vx"), 6.0, inertia=1, rest=True, **given)
-    with pytest.raises(lc.errors.SteeringError, match="target itself is inside"):
+    with pytest.raises(lc.errors.InfeasibleError, match="target itself is inside"):
         lc.steer("se2", (0, 2.1, 0), ("omega", "vx"), 6.0, inertia=1, **given)

@@ -22,6 +22,7 @@ from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.programme import Settings
 from lie_codegen.steering.direct.scene import CLEAR, ENOUGH, STRAIGHT, Result, Scene
 from lie_codegen.steering.direct.sharper import sharper
+from lie_codegen.steering.obstacles.blocked import refuse_blocked
 from lie_codegen.steering.obstacles.keep_out import KeepOut
 from lie_codegen.steering.plan import Plan, Status
 
@@ -48,13 +49,13 @@ def around(
 
     Raises:
         SteeringInputError: of least time, no bounds, or a system that depends on time.
-        InfeasibleError: proved, obstacles or not.
-        SteeringError: an end inside an obstacle; nothing was found, which proves nothing.
+        InfeasibleError: proved: obstacles or not, or by an end inside an obstacle.
+        SteeringError: nothing was found, which proves nothing.
     """
     began = time.perf_counter()
     where = f"steer({task.system.group.name})"
     keep_out = KeepOut.of(task.system.group.degree, obstacles)
-    refuse_blocked(task, keep_out, obstacles, where)
+    refuse_blocked_ends(task, obstacles, where)
     proof = None if objective == "time" else certificate(task)
     if proof is not None:
         raise InfeasibleError(f"{where}: infeasible even without obstacles: {proof}", certificate=proof)
@@ -168,21 +169,15 @@ def _refuse_endless(task: Manoeuvre, where: str) -> None:
         )
 
 
-def refuse_blocked(task: Manoeuvre, keep_out: KeepOut, obstacles: Sequence[Obstacle], where: str) -> None:
+def refuse_blocked_ends(task: Manoeuvre, obstacles: Sequence[Obstacle], where: str) -> None:
     """Nothing, where both ends are clear.
 
     Raises:
-        SteeringError: one is inside an obstacle.
+        InfeasibleError: one is inside an obstacle.
     """
     places = [("start", np.real(task.system.start))]
     end = task.end
     if end.elements is not None and not len(end.before) and not len(end.after):
         places.append(("target", np.real(end.elements[0])))
-    blocked = [
-        f"the {name} itself is inside obstacle {number} ({type(each).__name__})"
-        for name, X in places
-        for number, (each, gap) in enumerate(zip(obstacles, keep_out.gaps(X), strict=True), start=1)
-        if gap < 0
-    ]
-    if blocked:
-        raise SteeringError(f"{where}: no admissible manoeuvre; {'; '.join(blocked)}; move one of them")
+    named = [(f"obstacle {number} ({type(each).__name__})", each) for number, each in enumerate(obstacles, start=1)]
+    refuse_blocked(where, places, named)

@@ -15,7 +15,7 @@ from lie_codegen.exact.positive_matrix import as_floats, positive_matrix
 from lie_codegen.flow.elements import group_element
 from lie_codegen.groups.matrix_group import MatrixGroup, require_group
 from lie_codegen.steering.constraints import Obstacle, box_limits, check_obstacles
-from lie_codegen.steering.direct.around import refuse_blocked, scene_settings, searched_scene
+from lie_codegen.steering.direct.around import refuse_blocked_ends, scene_settings, searched_scene
 from lie_codegen.steering.direct.assemble import Manoeuvre
 from lie_codegen.steering.direct.guess import guessed
 from lie_codegen.steering.direct.problem import check_options, control_weights
@@ -90,7 +90,7 @@ def torques_around(
         )
     checked = check_obstacles(group, obstacles)
     keep_out = KeepOut.of(group.degree, checked)
-    refuse_blocked(task, keep_out, checked, where)
+    refuse_blocked_ends(task, checked, where)
     scene = TorqueScene(
         task, keep_out, checked, scene_settings(objective, iterations), objective, longest if objective == "time" else 0.0,
         motion=motion, inertia=J, ends=ends,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.steering.obstacles.blocked import refuse_blocked
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.flow import simulated_path
 from lie_codegen.steering.transcription.guess import guesses, smooth_torques
@@ -33,18 +34,17 @@ def failure_report(task: Task, structure: Structure, numbers: Numbers, candidate
     return "; ".join([*lines, f"try {advice}"])
 
 
-def ends_in_obstacles(task: Task, numbers: Numbers) -> list[str]:
-    """The ends and the via points that lie inside an obstacle."""
+def refuse_blocked_states(task: Task, numbers: Numbers) -> None:
+    """Nothing, where the ends and the via points are clear of the obstacles.
+
+    Raises:
+        InfeasibleError: one is inside an obstacle.
+    """
     places = [("start", np.eye(task.group.degree))]
     if not task.freedom:
         places.append(("target", task.target))
     places += [(f"via point {number}", element) for number, element in enumerate(numbers.via, start=1)]
-    return [
-        f"the {which} itself is inside {name}"
-        for obstacle, name in zip(numbers.obstacles, numbers.obstacle_names, strict=True)
-        for which, element in places
-        if obstacle.clearance(element[None])[0] < 0
-    ]
+    refuse_blocked(f"steer({task.group.name})", places, zip(numbers.obstacle_names, numbers.obstacles, strict=True))
 
 
 def _needs(task: Task, structure: Structure, numbers: Numbers, v: Array) -> list[str]:

@@ -22,7 +22,7 @@ from lie_codegen.flow.logarithm import distance
 from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.plan import Facts, Plan, Status
 from lie_codegen.steering.task import Task
-from lie_codegen.steering.transcription.failure_report import ends_in_obstacles, failure_report
+from lie_codegen.steering.transcription.failure_report import failure_report, refuse_blocked_states
 from lie_codegen.steering.transcription.flow import piecewise_linear
 from lie_codegen.steering.transcription.guess import (
     class_guesses,
@@ -83,10 +83,7 @@ def _run(
 ) -> Plan:
     started = time.perf_counter()
     structure, numbers = nondimensional(task, asked)
-    if blocked := ends_in_obstacles(task, numbers):
-        raise SteeringError(
-            f"steer({task.group.name}): no admissible manoeuvre; {'; '.join(blocked)}; move one of them"
-        )
+    refuse_blocked_states(task, numbers)
     names = _solvers(task, structure, asked)
     candidates: list[Candidate] = []
     building = 0.0
