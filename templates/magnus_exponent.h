@@ -29,6 +29,10 @@ static inline void entry(const V *x, const V *y, V *z, int i, int j)
 /* Complex matrices in blocks of 2 x 2; of 4 x 4 single entries where a vector has eight doubles, blocks where it has fewer (measured). */
 #define BLOCKS (PARTS == 2 && MATRIX >= (LANES == 8 << SINGLE ? 33 : 32))
 
+/* Real matrices in tiles of 3 x 3, which sixteen registers hold; small ones of small algebras are written out whole by the compiler (measured). */
+#define TILES (PARTS == 1 && (DIM > 8 || MATRIX > 16))
+#define SIDE 3
+
 #if BLOCKS
 /* Four entries at once, two rows by two columns: what is loaded is used twice, and eight sums do not wait for each other. */
 static inline __attribute__((always_inline)) void four_entries(const V *x, const V *y, int i, int j, V block[8])
@@ -106,6 +110,57 @@ static __attribute__((noinline)) void multiply(const V *x, const V *y, V *z)
         EACH(j, SIZE) { entry(x, y, z, ROWS - 1, j); }
     }
 }
+#elif TILES
+/* The loop is written out: what runs over a tile has to be in registers. */
+#define EACH_OF(k, n) _Pragma("GCC unroll 4") EACH(k, n)
+/* Entries of a real z = x y, `rows` by `columns` of them from (i, j) on, both constants: what is loaded is used as often, and the sums do not wait for each other. */
+static inline __attribute__((always_inline)) void tile(const V *x, const V *y, V *z, int i, int j, int rows, int columns)
+{
+    V sum[SIDE][SIDE];
+    EACH_OF(r, rows) {
+        EACH_OF(c, columns) { sum[r][c] = splat(0.0); }
+    }
+    for (int m = 0; m < ROWS; ++m) {
+        V left[SIDE], right[SIDE];
+        EACH_OF(r, rows) {
+            left[r] = x[(i + r) * SIZE + m];
+            HELD(left[r]);
+        }
+        EACH_OF(c, columns) {
+            right[c] = y[m * SIZE + j + c];
+            HELD(right[c]);
+        }
+        EACH_OF(r, rows) {
+            EACH_OF(c, columns) { sum[r][c] += left[r] * right[c]; }
+        }
+    }
+    EACH_OF(r, rows) {
+        EACH_OF(c, columns) { z[(i + r) * SIZE + j + c] = sum[r][c]; }
+    }
+}
+
+/* `rows` of z = x y from row i on, from column j on. */
+static inline __attribute__((always_inline)) void strip(const V *x, const V *y, V *z, int i, int j, int rows)
+{
+    for (; j + SIDE <= SIZE; j += SIDE) {
+        tile(x, y, z, i, j, rows, SIDE);
+    }
+    if (SIZE % SIDE) {
+        tile(x, y, z, i, j, rows, SIZE % SIDE);
+    }
+}
+
+/* z = x y. */
+static __attribute__((noinline)) void multiply(const V *x, const V *y, V *z)
+{
+    int i = 0;
+    for (; i + SIDE <= ROWS; i += SIDE) {
+        strip(x, y, z, i, 0, SIDE);
+    }
+    if (ROWS % SIDE) {
+        strip(x, y, z, i, 0, ROWS % SIDE);
+    }
+}
 #else
 /* z = x y. */
 #if MATRIX > 16
@@ -148,6 +203,14 @@ void half_product(const V *x, const V *y, V *z, double sign)
     }
     if (SIZE % 2) {
         EACH(i, SIZE) { entry(x, y, z, i, SIZE - 1); }
+    }
+#elif TILES
+    int first = 0;
+    for (; first + SIDE <= SIZE; first += SIDE) {
+        strip(x, y, z, first, first, SIDE);
+    }
+    if (SIZE % SIDE) {
+        strip(x, y, z, first, first, SIZE % SIDE);
     }
 #else
     EACH(i, SIZE) {

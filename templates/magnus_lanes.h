@@ -83,13 +83,39 @@ static inline V splat(Real x)
 #undef SAME
 }
 
-static Real largest(V x)
+/*
+ * The largest of numbers that are not negative; a NaN shows, of either sign. Bits without the sign have the order of the numbers, those of a
+ * NaN come last: lanes are compared as integers, in pairs.
+ */
+static inline Real largest(V x)
 {
-    Real most = x[0];
-    for (int l = 1; l < LANES; ++l) {
-        most = x[l] > most || x[l] != x[l] ? x[l] : most; /* a NaN shows */
-    }
-    return most;
+    const Bits second_highest = (Bits)1 << (8 * (int)sizeof(Real) - 2);
+    I most = (I)x & (second_highest - 1 + second_highest);
+#define ACROSS(l) most[(l) ^ (LANES / 2)]
+#define NEAR(l) most[(l) ^ (LANES / 4)]
+#define NEXT(l) most[(l) ^ (LANES / 8)]
+#define LARGER_OF(other) \
+    do { \
+        const I second = (I)LANEWISE(other), larger = most > second; \
+        most = (most & larger) | (second & ~larger); \
+    } while (0)
+    LARGER_OF(ACROSS);
+#if LANES > 2
+    LARGER_OF(NEAR);
+#endif
+#if LANES > 4
+    LARGER_OF(NEXT);
+#endif
+#undef LARGER_OF
+#undef ACROSS
+#undef NEAR
+#undef NEXT
+    x = (V)most;
+#if LANES > 8
+    return x[0] > x[1] || x[0] != x[0] ? x[0] : x[1];
+#else
+    return x[0];
+#endif
 }
 
 /* a b + c, rounded once: one instruction where the processor has it, else a call for each lane. */

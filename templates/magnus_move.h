@@ -37,9 +37,15 @@ static const double inverse_factorial[22] = {1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 2
 /* A scaled by a power of 2 so that its norm, which is returned, is at most `most`; how often it was halved. */
 static double halve(V *A, double most, int *halvings)
 {
-    V norm = splat(0.0);
-    EACH(k, MATRIX) { norm += A[k] * A[k]; }
-    double size = sqrt(largest(norm));
+    V norm = splat(0.0), second = norm; /* two sums, since one would wait for itself */
+    for (int k = 0; k + 1 < MATRIX; k += 2) {
+        norm += A[k] * A[k];
+        second += A[k + 1] * A[k + 1];
+    }
+    if (MATRIX % 2) {
+        norm += A[MATRIX - 1] * A[MATRIX - 1];
+    }
+    double size = sqrt(largest(norm + second));
     for (*halvings = 0; size > most && *halvings < 60; size *= 0.5) {
         ++*halvings;
     }

@@ -24,8 +24,9 @@ pytestmark = pytest.mark.skipif(not find_compilers(), reason="needs a C compiler
 
 #: Doubles behind and before every workspace.
 MARGIN, MARK = 64, 1.25e30
-#: su2 moves a quaternion and brackets by structure constants, su5 takes matrices of which half is kept, in blocks.
-GROUPS = ("su2", "su5")
+#: su2 moves a quaternion and brackets by structure constants, su5 takes matrices of which half is kept, in blocks;
+#: so7 (skew) and gl4 are real, in tiles.
+GROUPS = ("su2", "su5", "so7", "gl4")
 WIDTHS = (2, 4, 8)
 #: Relative to the largest entry of each result.
 ROUNDING = {"one": 2e-14, "many": 2e-14, "series": 2e-14, "single": 2e-6, "X": 2e-14, "dX": 1e-13, "slopes": 1e-13}
