@@ -192,9 +192,10 @@ class ParametricInput(Saved):
         return Waves(len(rates), _compiled(self._symbols, entries), _compiled(self._symbols, entries, "math"))
 
     def _stacked(self, entries: Sequence[Any], times: Array) -> Array:
-        return np.ascontiguousarray(
-            np.stack([np.broadcast_to(each, times.shape) for each in entries], axis=-1), dtype=float
-        )
+        found = np.empty((*times.shape, len(entries)))
+        for k, each in enumerate(entries):
+            found[..., k] = each
+        return found
 
 
 def parameter_values(parameters: tuple[str, ...], given: Mapping[str, Any], many: bool = False) -> tuple[Any, ...]:
