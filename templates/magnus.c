@@ -11,6 +11,7 @@
  * constants, else as matrices), QUATERNION; and hat(), lie_bracket(), quaternion_matrix().
  */
 #define HALVES 1 /* of skew-Hermitian matrices what lies above the diagonal is enough here */
+#define SIDE_BY_SIDE 1
 #include "magnus_words.h"
 
 #include "magnus_step.h"
@@ -28,7 +29,7 @@ static inline V middle_of(V knot, V inside, V h, V *low)
 EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots);
 EXPORT ptrdiff_t magnus_work(ptrdiff_t rates, ptrdiff_t terms, ptrdiff_t slots)
 {
-    return LANES * (source_vectors(rates, terms) + 1) + slots * (STATE + 1);
+    return FRONT * source_vectors(rates, terms) + LANES + slots * (STATE + 1);
 }
 
 /*
@@ -39,22 +40,23 @@ EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdif
 EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t from, ptrdiff_t to, const double *X0, ptrdiff_t slots,
     double *space, double *X, double *end)
 {
-    V *work = aligned(space);
-    Source source;
-    lay_out(u, work, &source);
-    double *kept = space + LANES * (source_vectors(u->rates, u->terms) + 1), *lane_of = kept + slots * STATE;
-    ptrdiff_t span[LANES], inside[LANES], left[LANES], at[LANES];
-    V state[STATE], knot = splat(0.0), h = splat(0.0), place = splat(0.0);
-    double prefix[LANES + 1][FULL];
-    identity(state);
+    Team team[TOGETHER];
+    double *kept = space + FRONT * source_vectors(u->rates, u->terms) + LANES, *lane_of = kept + slots * STATE;
+    ptrdiff_t span[FRONT], inside[FRONT], left[FRONT], at[FRONT];
+    V knot[TOGETHER], place[TOGETHER]; /* where a span begins, how many of its steps are done */
+    double prefix[FRONT + 1][FULL];
+    gather(u, space, team);
+    EACH(part, TOGETHER) { knot[part] = place[part] = team[part].h = splat(0.0); }
     for (ptrdiff_t k = 0; k < slots; ++k) {
         lane_of[k] = -1.0;
     }
-    EACH(l, LANES) {
-        const ptrdiff_t first = from + (to - from) / LANES * l + ((to - from) % LANES) * l / LANES;
-        const ptrdiff_t last = from + (to - from) / LANES * (l + 1) + ((to - from) % LANES) * (l + 1) / LANES;
+    EACH(l, FRONT) {
+        Team *const mine = team + l / LANES;
+        const int lane = l % LANES;
+        const ptrdiff_t first = from + (to - from) / FRONT * l + ((to - from) % FRONT) * l / FRONT;
+        const ptrdiff_t last = from + (to - from) / FRONT * (l + 1) + ((to - from) % FRONT) * (l + 1) / FRONT;
         ptrdiff_t low = 0, high = grid->spans;
-        set_waves(u, &source, l, 0);
+        set_waves(u, &mine->source, lane, 0);
         left[l] = last - first;
         at[l] = left[l] ? first : 0;
         while (high - low > 1) { /* the span in which the first step lies */
@@ -64,16 +66,16 @@ EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdif
         span[l] = low;
         inside[l] = first - grid->first[low];
         if (left[l]) {
-            knot[l] = grid->knots[low];
-            h[l] = (grid->knots[low + 1] - grid->knots[low]) / (double)grid->parts[low];
-            place[l] = (double)inside[l];
-            enter(u, grid, &source, l, low, h[l], 0);
+            knot[l / LANES][lane] = grid->knots[low];
+            mine->h[lane] = (grid->knots[low + 1] - grid->knots[low]) / (double)grid->parts[low];
+            place[l / LANES][lane] = (double)inside[l];
+            enter(u, grid, &mine->source, lane, low, mine->h[lane], 0);
         }
     }
-    find_driven(u, &source);
+    EACH(part, TOGETHER) { find_driven(u, &team[part].source); }
     for (;;) {
         ptrdiff_t count = 0;
-        EACH(l, LANES) {
+        EACH(l, FRONT) {
             if (left[l]) {
                 const ptrdiff_t rest = grid->parts[span[l]] - inside[l], mine = rest < left[l] ? rest : left[l];
                 count = count == 0 || mine < count ? mine : count;
@@ -83,14 +85,18 @@ EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdif
             break;
         }
         for (ptrdiff_t k = 0; k < count; ++k) {
-            const double *table[LANES];
-            V low;
-            const V middle = middle_of(knot, place, h, &low);
-            EACH(l, LANES) { table[l] = u->table + (u->table ? (left[l] ? at[l] + k : 0) * u->nodes * DIM : 0); }
-            step(u, &source, (int)order, middle, low, h, table, state);
-            place += 1.0;
+            EACH(part, TOGETHER) {
+                team[part].middle = middle_of(knot[part], place[part], team[part].h, &team[part].low);
+                place[part] += 1.0;
+            }
+            if (u->table) {
+                EACH(l, FRONT) { team[l / LANES].table[l % LANES] = u->table + (left[l] ? at[l] + k : 0) * u->nodes * DIM; }
+            }
+            step(u, team, (int)order);
         }
-        EACH(l, LANES) {
+        EACH(l, FRONT) {
+            Team *const mine = team + l / LANES;
+            const int lane = l % LANES;
             if (!left[l]) {
                 continue;
             }
@@ -100,31 +106,30 @@ EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdif
             if (inside[l] == grid->parts[span[l]]) {
                 const ptrdiff_t slot = grid->slot[span[l]];
                 if (slot >= 0) {
-                    EACH(k, STATE) { kept[slot * STATE + k] = state[k][l]; }
+                    EACH(k, STATE) { kept[slot * STATE + k] = mine->state[k][lane]; }
                     lane_of[slot] = l;
                 }
                 inside[l] = 0;
-                place[l] = 0.0;
+                place[l / LANES][lane] = 0.0;
                 ++span[l];
                 if (left[l]) {
-                    knot[l] = grid->knots[span[l]];
-                    h[l] = (grid->knots[span[l] + 1] - grid->knots[span[l]]) / (double)grid->parts[span[l]];
-                    enter(u, grid, &source, l, span[l], h[l], 0);
+                    knot[l / LANES][lane] = grid->knots[span[l]];
+                    mine->h[lane] = (grid->knots[span[l] + 1] - grid->knots[span[l]]) / (double)grid->parts[span[l]];
+                    enter(u, grid, &mine->source, lane, span[l], mine->h[lane], 0);
                 }
             }
             if (!left[l]) {
-                h[l] = 0.0; /* waits, at the identity of a step */
+                mine->h[lane] = 0.0; /* waits, at the identity of a step */
             }
         }
     }
     get(X0, prefix[0]);
-    EACH(l, LANES) {
-        double one[STATE], matrix[FULL];
-        EACH(k, STATE) { one[k] = state[k][l]; }
-        to_matrix(one, matrix);
+    EACH(l, FRONT) {
+        double matrix[FULL];
+        state_of(team, l, matrix);
         multiply_one(prefix[l], matrix, prefix[l + 1]);
     }
-    put(prefix[LANES], end);
+    put(prefix[FRONT], end);
     for (ptrdiff_t slot = 0; slot < slots; ++slot) {
         if (lane_of[slot] >= 0.0) {
             double matrix[FULL], moved[FULL];
@@ -144,35 +149,38 @@ EXPORT void magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptrdi
 EXPORT void magnus_many(const Input *u, const Grid *grid, ptrdiff_t order, ptrdiff_t count, const double *X0, ptrdiff_t X0_stride,
     ptrdiff_t slots, double *space, double *X)
 {
-    Source source;
-    lay_out(u, aligned(space), &source);
-    for (ptrdiff_t row = 0; row < count; row += LANES) {
-        double start[LANES][FULL];
-        const double *table[LANES];
-        V state[STATE];
-        ptrdiff_t at = 0;
-        identity(state);
-        EACH(l, LANES) {
+    Team team[TOGETHER];
+    gather(u, space, team);
+    for (ptrdiff_t row = 0; row < count; row += FRONT) {
+        double start[FRONT][FULL];
+        EACH(part, TOGETHER) { identity(team[part].state); }
+        EACH(l, FRONT) {
             const ptrdiff_t who = row + l < count ? row + l : count - 1; /* spare lanes repeat the last */
-            set_waves(u, &source, l, who);
+            set_waves(u, &team[l / LANES].source, l % LANES, who);
             get(X0 + who * X0_stride, start[l]);
-            table[l] = u->table ? u->table + who * u->table_stride : NULL;
+            team[l / LANES].table[l % LANES] = u->table ? u->table + who * u->table_stride : NULL;
         }
-        find_driven(u, &source);
+        EACH(part, TOGETHER) { find_driven(u, &team[part].source); }
         for (ptrdiff_t s = 0; s < grid->spans; ++s) {
             const double h = (grid->knots[s + 1] - grid->knots[s]) / (double)grid->parts[s];
-            EACH(l, LANES) { enter(u, grid, &source, l, s, h, row + l < count ? row + l : count - 1); }
-            for (ptrdiff_t k = 0; k < grid->parts[s]; ++k, ++at) {
+            EACH(l, FRONT) { enter(u, grid, &team[l / LANES].source, l % LANES, s, h, row + l < count ? row + l : count - 1); }
+            EACH(part, TOGETHER) { team[part].h = splat(h); }
+            for (ptrdiff_t k = 0; k < grid->parts[s]; ++k) {
                 V low;
                 const V middle = middle_of(splat(grid->knots[s]), splat((double)k), splat(h), &low);
-                step(u, &source, (int)order, middle, low, splat(h), table, state);
-                EACH(l, LANES) { table[l] = u->table ? table[l] + u->nodes * DIM : NULL; }
+                EACH(part, TOGETHER) {
+                    team[part].middle = middle;
+                    team[part].low = low;
+                }
+                step(u, team, (int)order);
+                if (u->table) {
+                    EACH(l, FRONT) { team[l / LANES].table[l % LANES] += u->nodes * DIM; }
+                }
             }
             if (grid->slot[s] >= 0) {
-                for (int l = 0; l < LANES && row + l < count; ++l) {
-                    double one[STATE], matrix[FULL], moved[FULL];
-                    EACH(k, STATE) { one[k] = state[k][l]; }
-                    to_matrix(one, matrix);
+                for (int l = 0; l < FRONT && row + l < count; ++l) {
+                    double matrix[FULL], moved[FULL];
+                    state_of(team, l, matrix);
                     multiply_one(start[l], matrix, moved);
                     put(moved, X + ((row + l) * slots + grid->slot[s]) * PARTS * SIZE * SIZE);
                 }

@@ -288,7 +288,8 @@ void matrix_bracket(const V *x, const V *y, V *z)
 }
 #define BRACKET matrix_bracket
 #else
-#define BRACKET lie_bracket
+#define BRACKET(x, y, z) \
+    EACH(vector, TOGETHER) { lie_bracket((x) + vector * DIM, (y) + vector * DIM, (z) + vector * DIM); }
 #endif
 
 /* ---- the exponent: brackets have the sign of X' = X A, c(a, b) = -[a, b] ---- */

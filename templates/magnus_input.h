@@ -101,7 +101,7 @@ static void enter(const Input *u, const Grid *grid, Source *source, int lane, pt
 
 #if TABLES
 /* Tables of values at the nodes: the generators of a step of every lane, `table` pointing at each lane's own, `apart` from node to node. */
-static __attribute__((noinline)) void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V a[ORDERS][DIM])
+static __attribute__((noinline)) void from_nodes(const Input *u, const double *const *table, ptrdiff_t apart, V h, V (*a)[TOGETHER * DIM])
 {
     for (ptrdiff_t g = 0; g < u->nodes; ++g) {
         EACH(i, DIM) {
@@ -121,7 +121,7 @@ static const double five_weight[5] = {0.28444444444444444, 0.23931433524968324, 
     0.11846344252809454};
 
 /* The generators of a Legendre series: those of each polynomial from its values at five nodes, times its coefficients. */
-static __attribute__((noinline)) void from_series(const Input *u, const Source *source, V middle, V low, V h, V a[ORDERS][DIM])
+static __attribute__((noinline)) void from_series(const Input *u, const Source *source, V middle, V low, V h, V (*a)[TOGETHER * DIM])
 {
     const V centre = 2.0 * (((middle - source->start) + (low - source->start_low)) / source->width) - 1.0, reach = 2.0 * h / source->width;
     V before[5], now[5], x[5];
@@ -155,7 +155,7 @@ static __attribute__((noinline)) void from_series(const Input *u, const Source *
 
 /* a_1 .. a_4 of a step of every lane, whose middles are middle + low. */
 static inline void generators(const Input *u, Source *source, V middle, V low, V h, const double *const *table,
-    V a[ORDERS][DIM])
+    V (*a)[TOGETHER * DIM])
 {
     EACH(j, ORDERS) {
         EACH(i, DIM) { a[j][i] = splat(0.0); }

@@ -3,21 +3,28 @@
 #define MAGNUS_MOVE_H
 
 #if QUATERNION
-/* q (dq - 1) is added; cos - 1 and sin / x in even powers of the half angle, no root and no division. */
+/*
+ * q (dq - 1) is added; cos - 1 and sin / x in even powers of the half angle, no root and no division. Of small angles, as steps to a tight
+ * tolerance have them, the powers from the sixth on add less than 2e-17 of the sums.
+ */
 static inline void move(V *omega, V *q)
 {
     const V x = omega[0] * HALF, y = omega[1] * HALF, z = omega[2] * HALF;
     V r = x * x + y * y + z * z, scale = splat(1.0);
     int halvings = 0;
-    for (double most = largest(r); most > 0.6 && halvings < 60; most *= 0.25) {
+    const double first = largest(r);
+    for (double most = first; most > 0.6 && halvings < 60; most *= 0.25) {
         ++halvings;
         scale *= 0.5;
     }
     r *= scale * scale;
-    V c = r * (-0.5 + r * (1.0 / 24 + r * (-1.0 / 720 + r * (1.0 / 40320 + r * (-1.0 / 3628800 + r * (1.0 / 479001600
-        + r * (-1.0 / 87178291200.0 + r * (1.0 / 20922789888000.0))))))));
-    V s = scale * (1.0 + r * (-1.0 / 6 + r * (1.0 / 120 + r * (-1.0 / 5040 + r * (1.0 / 362880 + r * (-1.0 / 39916800
-        + r * (1.0 / 6227020800.0 + r * (-1.0 / 1307674368000.0 + r * (1.0 / 355687428096000.0)))))))));
+    V c = splat(-1.0 / 3628800), s = splat(-1.0 / 39916800);
+    if (!(first <= 0.02)) {
+        c += r * (1.0 / 479001600 + r * (-1.0 / 87178291200.0 + r * (1.0 / 20922789888000.0)));
+        s += r * (1.0 / 6227020800.0 + r * (-1.0 / 1307674368000.0 + r * (1.0 / 355687428096000.0)));
+    }
+    c = r * (-0.5 + r * (1.0 / 24 + r * (-1.0 / 720 + r * (1.0 / 40320 + r * c))));
+    s = scale * (1.0 + r * (-1.0 / 6 + r * (1.0 / 120 + r * (-1.0 / 5040 + r * (1.0 / 362880 + r * s)))));
     for (; halvings; --halvings) { /* cos 2x - 1 and sin 2x */
         s = 2.0 * s * (1.0 + c);
         c = 2.0 * c * (2.0 + c);

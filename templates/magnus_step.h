@@ -1,13 +1,41 @@
-/* One step of every lane, X <- X exp(Omega). */
+/* One step of every lane of the vectors that go together, X <- X exp(Omega). */
 #ifndef MAGNUS_STEP_H
 #define MAGNUS_STEP_H
 
-/* One step of every lane. */
-static __attribute__((noinline)) void step(const Input *u, Source *source, int order, V middle, V low, V h, const double *const *table,
-    V *state)
+/* The lanes of one vector, TOGETHER of which take their steps side by side. */
+typedef struct {
+    Source source;
+    V middle, low, h;           /* of the step, its middle to twice the precision */
+    const double *table[LANES]; /* of values at nodes */
+    V state[STATE];
+} Team;
+
+/* `space`: FRONT * source_vectors + LANES numbers. */
+static void gather(const Input *u, Real *space, Team *team)
 {
-    V a[ORDERS][DIM], omega[WORK];
-    generators(u, source, middle, low, h, table, a);
+    EACH(part, TOGETHER) {
+        lay_out(u, aligned(space) + part * source_vectors(u->rates, u->terms), &team[part].source);
+        EACH(l, LANES) { team[part].table[l] = NULL; }
+        identity(team[part].state);
+    }
+}
+
+/* The state of one of the FRONT lanes as a whole matrix. */
+static void state_of(const Team *team, int lane, Real *matrix)
+{
+    Real one[STATE];
+    EACH(k, STATE) { one[k] = team[lane / LANES].state[k][lane % LANES]; }
+    to_matrix(one, matrix);
+}
+
+/* The next step of every lane. */
+static __attribute__((noinline)) void step(const Input *u, Team *team, int order)
+{
+    V a[ORDERS][TOGETHER * DIM], omega[WORK];
+    EACH(part, TOGETHER) {
+        Team *const t = team + part;
+        generators(u, &t->source, t->middle, t->low, t->h, t->table, (V (*)[TOGETHER * DIM])(a[0] + part * DIM));
+    }
 #if COORDINATES
 #define IN_WORK a
 #else
@@ -28,7 +56,7 @@ static __attribute__((noinline)) void step(const Input *u, Source *source, int o
     } else {
         exponent4((const V (*)[WORK])IN_WORK, omega);
     }
-    move(omega, state);
+    EACH(part, TOGETHER) { move(omega + part * DIM, team[part].state); }
 }
 
 #endif

@@ -15,10 +15,19 @@
 #ifndef HALVES
 #define HALVES 0 /* of skew-Hermitian matrices whole ones are kept */
 #endif
+/*
+ * Vectors of lanes that take their steps side by side: in small algebras every bracket waits for the one before, and the processor does not see
+ * as far ahead as the next step; a second vector fills the gaps.
+ */
+#ifndef SIDE_BY_SIDE
+#define SIDE_BY_SIDE 0
+#endif
+#define TOGETHER (SIDE_BY_SIDE && COORDINATES && DIM <= 3 ? 2 : 1)
+#define FRONT (TOGETHER * LANES)
 #define MATRIX (PARTS * ROWS * SIZE)
 #define FULL (PARTS * SIZE * SIZE)
 #if COORDINATES
-#define WORK DIM
+#define WORK (TOGETHER * DIM)
 #else
 #define WORK MATRIX
 #endif
