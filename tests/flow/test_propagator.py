@@ -168,3 +168,21 @@ def test_bad_input_is_named() -> None:
         lc.propagator("su2", QUBIT, duration=-1.0)
     with pytest.raises(InputError, match="cannot name a parameter"):
         lc.ParametricInput(["t"], parameters=("t",))
+
+
+def test_a_few_of_many_members_only_guess_the_steps() -> None:
+    """The largest u of the first members has one direction, so that their first two runs agree; the others need more steps."""
+    u = lc.ParametricInput(["a", "b*cos(t)", "b*sin(3*t/2)"], parameters=("a", "b"))
+    U = lc.propagator("so3", u, duration=20.0, rtol=1e-10)
+    a, b = np.full(300, 0.4), np.full(300, 0.9)
+    a[:40], b[:40] = 2.5, 0.0
+    many = U.batch(a=a, b=b)
+    np.testing.assert_allclose(many.X[:40], many.X[:1].repeat(40, 0), rtol=0, atol=1e-14)
+    hat = lc.group("so3").hat
+
+    def rates(t: float, x: np.ndarray) -> np.ndarray:
+        return (x.reshape(3, 3) @ hat([0.4, 0.9 * np.cos(t), 0.9 * np.sin(1.5 * t)])).ravel()
+
+    exact = solve_ivp(rates, (0, 20), np.eye(3).ravel(), method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1].reshape(3, 3)
+    np.testing.assert_allclose(many.X[299], exact, rtol=0, atol=3e-10)
+    assert many.steps >= U.batch(a=a[40:60], b=b[40:60]).steps

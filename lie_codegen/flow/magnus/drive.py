@@ -56,6 +56,17 @@ class Drive(Saved):
     def _fastest(self) -> float:
         return self.formula.fastest if self.rates.ndim == 1 else float(np.max(np.abs(self.rates), initial=0.0))
 
+    @property
+    def busiest(self) -> int:
+        """The trajectory with the largest coefficients and rates: where the shortest steps are likely to be asked for."""
+        formula, size = self.formula, np.zeros(1)
+        for table in (formula.cosines, formula.sines, formula.left, formula.right):
+            size = size + np.sum(np.abs(table), axis=(-2, -1))
+        size = size * np.abs(self.factor)
+        if self.rates.ndim == 2:
+            size = size + np.max(np.abs(self.rates), axis=-1, initial=0.0)
+        return int(np.argmax(size))
+
     def values(self, moments: Array, lengths: Array, at: Array) -> Array:
         """factor u at the fractions `at` of steps: (k, points, n), or (N, k, points, n).
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -24,6 +25,8 @@ MOST_STEPS = 2**26
 BLOCK = 2_000_000
 #: Steps of one trajectory, and trajectories, below which another thread costs more than it brings.
 _LEAST_STEPS, _LEAST_TRAJECTORIES = 4096, 32
+#: Of so many trajectories a few, as many as lanes go together at most, say how many steps are needed.
+_MANY, _FEW = 256, 16
 #: What single precision is asked for at best, and what one rounding costs there.
 SINGLE_GOAL, _SINGLE_ROUNDING = 1e-6, 2.0**-24
 #: The steps are never made more than so many times shorter at once: far from convergence the estimate says little.
@@ -129,26 +132,41 @@ def _led_by_python(
     base = plan_steps(drive, norms_of(group), times, most)
     if base is None:
         raise ComputationError(_TOO_FAST.format(where=where, most=most))
-    before, coarse = 1, _finite(flow(group, drive, base, order, X0, threads, single), where)
-    multiple, trust = 2, order - 2
-    while True:
-        if base.count * multiple > most:
-            raise ComputationError(_NOT_REACHED.format(where=where, most=most, done=base.count * before))
-        steps = base.times(multiple)
-        fine = _finite(flow(group, drive, steps, order, X0, threads, single), where)
-        scale = max(1.0, float(np.max(np.abs(fine))))
-        difference = float(np.max(np.abs(fine - coarse), initial=0.0))
-        ratio = multiple / before
-        estimate = difference / (ratio**trust - 1)
-        goal = max(rtol * scale, atol)
-        floor = scale * (_single_floor(group, drive, steps) if single else 4e-16 * np.sqrt(steps.count))
-        if estimate <= max(goal, floor):
-            known = (max(estimate, floor) if single else estimate) + drive.error * scale
-            return MagnusRun(fine, order, multiple, steps.count, steps.longest, steps.shortest, known)
-        # The next run should reach half the goal, by the order as it is; it is at least half as fine again, so that the two can be compared.
-        needed = (difference / (ratio**order - 1) / max(goal / 2, floor)) ** (1 / order)
-        before, coarse, trust = multiple, fine, order
-        multiple = int(np.ceil(multiple * min(max(needed, 1.5), _LARGEST_LEAP)))
+
+    def run(steps: Steps, members: range | None = None) -> Array:
+        return _finite(flow(group, drive, steps, order, X0, threads, single, members), where)
+
+    def floor(steps: Steps) -> float:
+        return _single_floor(group, drive, steps) if single else float(4e-16 * np.sqrt(steps.count))
+
+    def agree(run: Callable[[Steps], Array], before: int = 1, multiple: int = 2) -> MagnusRun:
+        """From runs with `before` and `multiple` times the steps on, until two agree."""
+        coarse, trust = run(base.times(before)), order if before > 1 else order - 2
+        while True:
+            if base.count * multiple > most:
+                raise ComputationError(_NOT_REACHED.format(where=where, most=most, done=base.count * before))
+            steps = base.times(multiple)
+            fine = run(steps)
+            scale = max(1.0, float(np.max(np.abs(fine))))
+            difference = float(np.max(np.abs(fine - coarse), initial=0.0))
+            ratio = multiple / before
+            estimate = difference / (ratio**trust - 1)
+            goal, lowest = max(rtol * scale, atol), scale * floor(steps)
+            if estimate <= max(goal, lowest):
+                known = (max(estimate, lowest) if single else estimate) + drive.error * scale
+                return MagnusRun(fine, order, multiple, steps.count, steps.longest, steps.shortest, known)
+            # The next run should reach half the goal, by the order as it is; it is at least half as fine again, so that the two can be compared.
+            needed = (difference / (ratio**order - 1) / max(goal / 2, lowest)) ** (1 / order)
+            before, coarse, trust = multiple, fine, order
+            multiple = int(np.ceil(multiple * min(max(needed, 1.5), _LARGEST_LEAP)))
+
+    many = len(X0) if X0.ndim == 3 else drive.many or 1
+    if many < _MANY or magnus_library(group) is None:
+        return agree(run)
+    # A few of many, the busiest among them, find out how many steps are needed; all are held to the same rule, but spared the first run.
+    first = min(max(drive.busiest - _FEW // 2, 0), many - _FEW)
+    found = agree(partial(run, members=range(first, first + _FEW))).multiple
+    return agree(run) if found == 2 else agree(run, max(2, -(-found // _LARGEST_LEAP)), found)
 
 
 def _single_floor(group: MatrixGroup, drive: Drive, steps: Steps) -> float:
@@ -199,11 +217,18 @@ def solver_of(group: MatrixGroup) -> Solver | None:
 
 
 def flow(
-    group: MatrixGroup, drive: Drive, steps: Steps, order: int, X0: Array, threads: int = 1, single: bool = False
+    group: MatrixGroup,
+    drive: Drive,
+    steps: Steps,
+    order: int,
+    X0: Array,
+    threads: int = 1,
+    single: bool = False,
+    members: range | None = None,
 ) -> Array:
     """X at the slots by one pass over the steps: (slots, d, d), or (slots, N, d, d) where u, its factor or X0 has N.
 
-    `single`: N trajectories in single precision, where there is a compiler.
+    `single`: N trajectories in single precision, where there is a compiler. `members`: of N only these, where there is a compiler.
     """
     library = magnus_library(group)
     many = len(X0) if X0.ndim == 3 else drive.many
@@ -214,9 +239,11 @@ def flow(
     if many is not None:
         move = library.many_single if single else library.many
         start = X0.astype(np.complex64 if X0.dtype.kind == "c" else np.float32) if single else X0
+        chosen = range(many) if members is None else members
         parts = share_out(
-            lambda a, b: move(drive, steps, order, start, a, b), many, threads, _LEAST_TRAJECTORIES, steps.count
-        )
+            lambda a, b: move(drive, steps, order, start, chosen.start + a, chosen.start + b),
+            len(chosen), threads, _LEAST_TRAJECTORIES, steps.count,
+        )  # fmt: skip
         return np.ascontiguousarray(np.moveaxis(np.concatenate(parts), 0, 1), dtype=X0.dtype)
     if threads == 1:
         return _in_blocks(library, drive, steps, order, X0)
