@@ -22,6 +22,11 @@ TWIN = 260
 #: Statements a number that is read or written, up to which a loop of its own stores large results past the caches as they are made: beyond,
 #: computing takes longer than moving, and the compiler's time for a third copy of the body buys nothing.
 MOVING = 10
+#: Statements a number that is read or written, between which each sample is a call where results stay in the caches, and the operations in them:
+#: with fewer, records are only copied, and with more it is lanes that pay. In between it takes longer to gather and to spread long records, beyond
+#: `SHORT` numbers, than to compute (measured, with four and with eight lanes: compose, inverse and Ad of SE_2(3) in .72 to .82 of the time).
+LIGHT, SHORT = (0.5, 2.0), 8
+_OF_LIGHT = {"INPUT", "CONST", "ADD", "SUB", "MUL", "NEG", "SQ", "TWICE"}
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,7 @@ class LaneBody:
         twin: the same for a second vector of samples, to be interleaved with the first; its entries follow those of the
             first in every port. Only for short bodies.
         past: whether the twins have a second loop, for results that go past the caches.
+        light: whether each sample is a call instead where results stay in the caches; to the last bit the same.
     """
 
     statements: tuple[LaneStatement | LaneBlock, ...]
@@ -105,6 +111,7 @@ class LaneBody:
     work_size: int = 0
     twin: LaneBody | None = None
     past: bool = False
+    light: bool = False
 
     @property
     def inline(self) -> bool:
@@ -150,9 +157,13 @@ def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBod
         body = _body(tape, target)
         if not body.inline:
             return body
-        return replace(
-            body, twin=_twin(tape, sizes, target), past=body.size <= MOVING * (sum(sizes) + len(body.stores))
+        numbers = sum(sizes) + len(body.stores)
+        light = (
+            LIGHT[0] < body.size / max(numbers, 1) <= LIGHT[1]
+            and max((*sizes, *map(len, tape.outputs)), default=0) > SHORT
+            and {s.op for s in tape.statements} <= _OF_LIGHT
         )
+        return replace(body, twin=_twin(tape, sizes, target), past=body.size <= MOVING * numbers, light=light)
     parts = []
     for part in pieces.parts:
         body = _body(part.tape, target, ports)

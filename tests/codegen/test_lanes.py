@@ -12,7 +12,9 @@ import pytest
 import toy_kernels
 from operation_kernels import every_operation, mixed, sided, sizes
 
+import lie_codegen as lc
 from lie_codegen.codegen.lane_forms import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, SLOW_FORMS
+from lie_codegen.codegen.lanes import lane_body
 from lie_codegen.codegen.opcodes import C99_FORMS
 from lie_codegen.codegen.package import render_library
 from lie_codegen.codegen.reciprocals import with_shared_reciprocals
@@ -277,6 +279,21 @@ def test_results_beyond_the_caches_are_the_same(body: Any, shift: int) -> None:
             np.testing.assert_array_equal(whole[some], part)
             columns = [np.broadcast_to(entry, 50) for entry in entries]
             np.testing.assert_allclose(whole[some].T, columns, rtol=1e-14, atol=1e-14)
+
+
+def test_records_that_are_moved_more_than_computed_are_calls_to_the_last_bit() -> None:
+    """compose of SE_2(3) moves 75 numbers for 63 sums and products; exp computes, ad copies."""
+    kernels = {kernel.name: kernel for kernel in lc.group_kernels("se_2_3")}
+    light = {
+        name: lane_body(tape_of(kernels[name]), [port.size for port in kernels[name].inputs]).light
+        for name in ("compose", "inverse", "Ad", "exp", "ad")
+    }
+    assert light == {"compose": True, "inverse": True, "Ad": True, "exp": False, "ad": False}
+    compose = build_kernels(lambda: [kernels["compose"]]).compose
+    X, Y = np.random.default_rng(3).normal(size=(2, 37, 5, 5))
+    np.testing.assert_array_equal(compose.batch(X, Y), [compose(x, y) for x, y in zip(X, Y, strict=True)])
+    np.testing.assert_array_equal(compose.batch(X, Y[0]), [compose(x, Y[0]) for x in X])
+    np.testing.assert_array_equal(compose.batch(X, Y, out=X.copy()), compose.batch(X, Y))
 
 
 @pytest.fixture
