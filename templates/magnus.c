@@ -124,11 +124,9 @@ EXPORT void magnus_one(const Input *u, const Grid *grid, ptrdiff_t order, ptrdif
         }
     }
     get(X0, prefix[0]);
-    EACH(l, FRONT) {
-        double matrix[FULL];
-        state_of(team, l, matrix);
-        multiply_one(prefix[l], matrix, prefix[l + 1]);
-    }
+    double matrices[FRONT][FULL];
+    EACH(l, FRONT) { state_of(team, l, matrices[l]); }
+    EACH(l, FRONT) { multiply_one(prefix[l], matrices[l], prefix[l + 1]); }
     put(prefix[FRONT], end);
     for (ptrdiff_t slot = 0; slot < slots; ++slot) {
         if (lane_of[slot] >= 0.0) {

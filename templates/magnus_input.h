@@ -5,7 +5,8 @@
 #include "magnus_given.h"
 
 /* What the lanes know of u; `waves` and `lines` lie in the workspace. */
-typedef struct {
+typedef struct Source {
+    const struct Source *before; /* the vector beside this one whose lanes come first, or NULL */
     V *cosines, *sines; /* rates x DIM */
     V *rate, *rate_low;
     V *weights;         /* rates x ORDERS: k_1 .. k_4 of w h */
@@ -56,13 +57,15 @@ static void set_weights(const Input *u, Source *source, int lane, double h)
         return;
     }
     source->h[lane] = source->turned[lane] = h;
+    const Source *const next = lane ? source : source->before;
+    const int beside = (lane ? lane : LANES) - 1;
     for (ptrdiff_t f = 0; f < u->rates; ++f) {
         const double rate = source->rate[f][lane];
         double k[ORDERS], turn[2];
         /* Lanes mostly share their rates and steps; sines cost more than a step. */
-        if (lane && source->h[lane - 1] == h && source->turned[lane - 1] == h && source->rate[f][lane - 1] == rate) {
-            EACH(i, ORDERS) { k[i] = source->weights[f * ORDERS + i][lane - 1]; }
-            EACH(i, 2) { turn[i] = source->turn[2 * f + i][lane - 1]; }
+        if (next && next->h[beside] == h && next->turned[beside] == h && next->rate[f][beside] == rate) {
+            EACH(i, ORDERS) { k[i] = next->weights[f * ORDERS + i][beside]; }
+            EACH(i, 2) { turn[i] = next->turn[2 * f + i][beside]; }
         } else {
             const double half = sin(0.5 * rate * h);
             wave_weights(rate * h, k);

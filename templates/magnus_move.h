@@ -171,8 +171,8 @@ static void to_matrix(const double *state, double *X)
     memset(X, 0, FULL * sizeof(double));
 #if QUATERNION
     {
-        const double norm = sqrt(state[0] * state[0] + state[1] * state[1] + state[2] * state[2] + state[3] * state[3]);
-        const double unit[4] = {state[0] / norm, state[1] / norm, state[2] / norm, state[3] / norm};
+        const double scale = 1.0 / sqrt(state[0] * state[0] + state[1] * state[1] + state[2] * state[2] + state[3] * state[3]);
+        const double unit[4] = {state[0] * scale, state[1] * scale, state[2] * scale, state[3] * scale};
         quaternion_matrix(unit, X);
     }
 #else

@@ -15,6 +15,7 @@ static ptrdiff_t source_vectors(ptrdiff_t rates, ptrdiff_t terms)
 
 static void lay_out(const Input *u, V *space, Source *source)
 {
+    source->before = NULL;
     source->cosines = space;
     source->sines = source->cosines + u->rates * DIM;
     source->rate = source->sines + u->rates * DIM;

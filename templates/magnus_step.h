@@ -15,6 +15,7 @@ static void gather(const Input *u, Real *space, Team *team)
 {
     EACH(part, TOGETHER) {
         lay_out(u, aligned(space) + part * source_vectors(u->rates, u->terms), &team[part].source);
+        team[part].source.before = part ? &team[part - 1].source : NULL;
         EACH(l, LANES) { team[part].table[l] = NULL; }
         identity(team[part].state);
     }
