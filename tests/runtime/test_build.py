@@ -27,7 +27,7 @@ from lie_codegen.runtime import build, cache, cache_folder, compiler, entry_libr
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.build import build_kernels
 from lie_codegen.runtime.cache_upkeep import cache_info, clear_cache, evict
-from lie_codegen.runtime.compiler import FLAGS, find_compilers, flags_for, lane_flags
+from lie_codegen.runtime.compiler import FLAGS, compile_library, find_compilers, flags_for, lane_flags
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A child imports the package, the helpers of the tests, and this file.
@@ -334,6 +334,19 @@ def test_flags_never_change_the_arithmetic_of_the_process() -> None:
     assert set(FLAGS) < set(flags_for(1))
     assert set(flags_for(1000)) < set(lane_flags(1000))
     assert lane_flags(10) == flags_for(10)
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_a_compiler_that_cannot_schedule_compiles_lanes_without(name: str, tmp_path: Path) -> None:
+    if shutil.which(name) is None:
+        pytest.skip(f"no {name}")
+    compiler = find_compilers({**os.environ, "CC": name})[0]
+    (tmp_path / "lanes.c").write_text("int one(void);\nint one(void) { return 1; }\n")
+    compile_library(compiler, tmp_path, "lanes.c", "lanes.so", lane_flags(1000))
+    assert (tmp_path / "lanes.so").stat().st_size > 0
+    (tmp_path / "wrong.c").write_text("int one(void) { return two; }\n")
+    with pytest.raises(CompileError, match="two"):
+        compile_library(compiler, tmp_path, "wrong.c", "wrong.so", lane_flags(1000))
 
 
 def test_the_ladder(tmp_path: Path) -> None:
