@@ -144,7 +144,8 @@ def test_an_interrupted_hunt_keeps_its_rows_and_goes_on(tmp_path: Path, monkeypa
 
     def second() -> tuple[int, list[str]]:
         if stop.exists():
-            for wait in (0.2, 10.0, 50.0):  # one that meets the parent within the callbacks of its fork is swallowed there
+            # One that meets the parent within the callbacks of its fork is swallowed there.
+            for wait in (0.2, 10.0, 50.0):
                 time.sleep(wait)
                 os.kill(os.getppid(), signal.SIGINT)
         note.write_text(note.read_text() + ", second")
