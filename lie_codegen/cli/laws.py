@@ -83,7 +83,7 @@ def _certified(kernel: Any) -> tuple[dict[str, Any], str]:
     from lie_codegen.control.certificate import certificate
     from lie_codegen.kernel.plain_data import made_from
 
-    given = ((kernel.definition or {}).get("parameters") or {}).get("group")
+    given = _parameters(kernel).get("group")
     found = certificate(kernel.namespace if given is None else made_from(given), law=kernel)
     names = ("level", "L", "rate", "k", "theorem_rate_proved", "limit_rate")
     words = (
@@ -107,10 +107,15 @@ def _data(kernel: Any) -> dict[str, Any]:
         "outputs": ports(kernel.outputs),
         "parameters": {
             name: value
-            for name, value in ((kernel.definition or {}).get("parameters") or {}).items()
+            for name, value in _parameters(kernel).items()
             if name not in ("group", "name") and value is not None
         },
     }
+
+
+def _parameters(kernel: Any) -> dict[str, Any]:
+    """What the law was made of, as its definition says; nothing of one that was written by hand."""
+    return dict((kernel.definition or {}).get("parameters", {}))
 
 
 def _lines(data: dict[str, Any]) -> list[str]:

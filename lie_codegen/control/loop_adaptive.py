@@ -19,7 +19,7 @@ from lie_codegen.flow.gauss_steps import gauss
 from lie_codegen.flow.pair853 import PairRun, integrate
 from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
-from lie_codegen.mechanics.states import elements_of
+from lie_codegen.groups.maps.packed_arrays import elements_of
 from lie_codegen.runtime.library import Library
 from lie_codegen.runtime.outputs import copied
 

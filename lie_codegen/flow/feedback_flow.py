@@ -23,7 +23,7 @@ from lie_codegen.flow.product_step import Move
 from lie_codegen.flow.second_kind_coordinates import second_kind
 from lie_codegen.flow.short_state import short_states
 from lie_codegen.flow.trajectory import Trajectory
-from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.groups.maps.packed_arrays import elements_of, packed_elements
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.runtime.library import Library
@@ -129,9 +129,6 @@ def _compiled(
     rtol: float, atol: float, where: str, threads: int,
 ) -> tuple[Array, Array, Array, int, float, int]:  # fmt: skip
     n, count = group.dim, len(X0)
-    rows, columns = np.array(varying_entries(group)).T
-    packed = np.ascontiguousarray(X0[:, rows, columns])
-    flat = packed.view(float) if group.is_complex else packed
     numbers, short = (np.asarray(eps[0] if count == 1 else eps),), short_states([group])
     if short is not None:
         system = System(
@@ -145,7 +142,7 @@ def _compiled(
     try:
         run = integrate(
             system,
-            np.ascontiguousarray(flat, dtype=float),
+            packed_elements(group, X0),
             y0,
             times,
             rtol=rtol,
@@ -157,10 +154,7 @@ def _compiled(
         if law.reads == "g":
             raise ChartError(f"{error}; or the chart of the coordinates g ends there") from None
         raise
-    values = np.ascontiguousarray(run.X).view(complex) if group.is_complex else run.X
-    X = np.broadcast_to(np.eye(group.degree, dtype=values.dtype), (*run.X.shape[:2], group.degree, group.degree)).copy()
-    X[..., rows, columns] = values
-    g = run.y[..., system.group :]
+    X, g = elements_of(group, run.X), run.y[..., system.group :]
     clock = np.repeat(times, count)
     place = X.reshape(-1, group.degree, group.degree) if law.reads == "X" else g.reshape(-1, n)
     u = row_by_row(library.feedback_value, clock, np.ascontiguousarray(place))[0].reshape(len(times), count, n)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from lie_codegen.errors import InputError, NotFiniteError, ShapeError
 from lie_codegen.flow.magnus.drive import Drive, formula_drive, resolved_drive
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
+from lie_codegen.recent import Recent
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
 from lie_codegen.values import Value, contents
 
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     from lie_codegen.signals.resolved_input import ResolvedInput
 
 #: Functions that were resolved, by what they hold: so many at most, of so many bytes.
-_kept: dict[Hashable, ResolvedInput] = {}
-_MOST, _LARGEST = 32, 2**20
+_kept: Recent[ResolvedInput] = Recent(32)
+_LARGEST = 2**20
 #: How far a value that is asked for alone may lie from the same among others, relative to the largest.
 _ALIKE = 1e-13
 
@@ -115,10 +116,8 @@ def _pieces(
             signal.evaluate, start, end, tolerance=tolerance, resolution=resolution, breakpoints=signal.breakpoints, where=where
         )  # fmt: skip
         if key is not None and found.series.nbytes <= _LARGEST:
-            while len(_kept) >= _MOST:
-                _kept.pop(next(iter(_kept)), None)
             found.series.flags.writeable = found.times.flags.writeable = found.corners.flags.writeable = False
-            _kept[key] = found
+            _kept.keep(key, found)
     return found
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from lie_codegen.errors import InputError
 from lie_codegen.kernel.saved import record_of, value_of
+from lie_codegen.recent import Recent
 from lie_codegen.runtime import cache
 from lie_codegen.runtime.cache_folder import cache_folder, why_unusable
 from lie_codegen.runtime.digests import digest, package_digest, versions
@@ -23,8 +24,7 @@ T = TypeVar("T")
 
 
 #: What was found or made in this process, by its source, so that no file is read twice; the oldest goes first.
-_known: dict[Hashable, Any] = {}
-_MOST = 256
+_known: Recent[Any] = Recent(256)
 
 
 def find_record(kind: str, source: Any) -> Any:
@@ -76,9 +76,7 @@ def _asked(form: str, kind: str, source: Any) -> Hashable:
 
 def _keep(asked: Hashable, found: Any) -> None:
     if asked is not None and found is not None:
-        while len(_known) >= _MOST:
-            _known.pop(next(iter(_known)), None)
-        _known[asked] = found
+        _known.keep(asked, found)
 
 
 def source_of(*given: Any) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from lie_codegen.recent import Recent
 from lie_codegen.runtime import cache, records
 
 
@@ -26,8 +27,7 @@ def looked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     records.package_digest()  # once a process, from a note of its own
     monkeypatch.setattr(cache, "find_note", find_note)
     monkeypatch.setattr(cache, "store_note", lambda *_: None)
-    monkeypatch.setattr(records, "_known", {})
-    monkeypatch.setattr(records, "_MOST", 2)
+    monkeypatch.setattr(records, "_known", Recent(2))
     return keys
 
 

@@ -18,9 +18,9 @@ from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import InfeasibleError, SteeringError, SteeringInputError, UncontrollableError
+from lie_codegen.groups.maps.packed_arrays import packed_elements
 from lie_codegen.steering.accessibility import with_drift
 from lie_codegen.steering.constraints import Ball
-from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.plan import Plan
 from lie_codegen.steering.transcription import problem as transcription_problem
 from lie_codegen.steering.transcription import watched_solver
@@ -51,7 +51,7 @@ def test_derivatives_of_an_interval_are_those_casadi_finds(
     total = 0.7 * step.cost(w, p) + ca.dot(ca.DM(multipliers), step.value(w, p))
     exact = ca.Function("exact", [w, p], [ca.jacobian(step.value(w, p), w), *reversed(ca.hessian(total, w))])
     at = rng.normal(size=structure.width)
-    at[: structure.size] = pack_element(group, expm(group.hat(rng.normal(size=group.dim))))
+    at[: structure.size] = packed_elements(group, expm(group.hat(rng.normal(size=group.dim))))
     numbers = rng.uniform(0.5, 1.5, size=structure.parameters)
     if structure.second_order:
         first, last = structure.parameter_ranges["masses"]

@@ -5,23 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.groups.maps.element_pattern import packed_size
+from lie_codegen.groups.maps.packed_arrays import elements_of, packed_elements
 from lie_codegen.steering.ocp.problem_data import ProblemData
 
 
 def pack_element(data: ProblemData, X: Array) -> Array:
     """The varying entries of an element, complex ones as re, im."""
-    rows, columns = np.array(varying_entries(data.group)).T
-    entries = np.ascontiguousarray(X[rows, columns])
-    return entries.astype(complex).view(float) if data.group.is_complex else entries.real.astype(float)
+    return packed_elements(data.group, X if data.group.is_complex else X.real)
 
 
 def unpack_elements(data: ProblemData, x: Array) -> tuple[Array, Array]:
     """(k, d, d) elements and (k, q) other states of (k, stored) states."""
-    group = data.group
-    rows, columns = np.array(varying_entries(group)).T
-    size = len(rows) * (2 if group.is_complex else 1)
-    entries = np.ascontiguousarray(x[:, :size])
-    X = np.tile(np.eye(group.degree, dtype=complex if group.is_complex else float), (len(x), 1, 1))
-    X[:, rows, columns] = entries.view(complex) if group.is_complex else entries
-    return X, np.ascontiguousarray(x[:, size:])
+    size = packed_size(data.group)
+    return elements_of(data.group, x[:, :size]), np.ascontiguousarray(x[:, size:])

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.steering.ocp.elements import pack_element
 from lie_codegen.steering.ocp.model_sizes import Model
 from lie_codegen.steering.ocp.problem_data import QUADRATURES, ProblemData
 
@@ -53,10 +53,7 @@ class InterpretedModel:
 
     def packed(self, X: Array, z: Array) -> Array:
         """A state as stored."""
-        rows, columns = np.array(varying_entries(self.data.group)).T
-        entries = np.ascontiguousarray(X[rows, columns])
-        flat = entries.view(float) if self.data.group.is_complex else entries
-        return np.concatenate([flat, z])
+        return np.concatenate([pack_element(self.data, X), z])
 
     def given(self, k: int) -> Array:
         """Rows of g that no control can change: at the start those of the state alone."""

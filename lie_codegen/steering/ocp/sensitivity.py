@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.door import warn_caller
 from lie_codegen.errors import AssumptionWarning, InputError
-from lie_codegen.groups.maps.element_pattern import varying_entries
+from lie_codegen.groups.maps.packed_arrays import packed_elements
+from lie_codegen.recent import Recent
 from lie_codegen.steering.ocp.interpreted import InterpretedMachine
 from lie_codegen.steering.ocp.interpreted_merit import Run
 from lie_codegen.steering.ocp.interpreted_model import InterpretedModel
@@ -117,9 +118,7 @@ def predict(plan: Solution, changes: Mapping[str, ArrayLike]) -> Array:
 
 def _stored(plan: Solution, k: int) -> Array:
     """A state as the solver keeps it."""
-    rows, columns = np.array(varying_entries(plan.problem.group)).T
-    entries = np.ascontiguousarray(plan.X[k][rows, columns])
-    return np.concatenate([entries.view(float), plan.z[k]])
+    return np.concatenate([packed_elements(plan.problem.group, plan.X[k]), plan.z[k]])
 
 
 def weakly_active(plan: Solution) -> tuple[tuple[str, int], ...]:
@@ -166,14 +165,11 @@ def _extended(data: ProblemData, name: str) -> ProblemData:
         parameters=Layout("parameter", tuple(each for each in data.parameters.shapes if each[0] != name)),
         rates=(*data.rates, (name, ("0",) * prod(shape))),
     )
-    if len(_EXTENDED) >= _MOST:
-        _EXTENDED.pop(next(iter(_EXTENDED)))
-    _EXTENDED[key] = (data, extended)
+    _EXTENDED.keep(key, (data, extended))
     return extended
 
 
-_MOST = 32
-_EXTENDED: dict[tuple[int, str], tuple[ProblemData, ProblemData]] = {}
+_EXTENDED: Recent[tuple[ProblemData, ProblemData]] = Recent(32)
 
 
 def _forward(

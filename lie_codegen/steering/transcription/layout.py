@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
-from lie_codegen.steering.packing import pack_element
+from lie_codegen.groups.maps.packed_arrays import packed_elements
 from lie_codegen.steering.transcription.numbers import Numbers
 from lie_codegen.steering.transcription.structure import Structure
 
@@ -83,7 +83,7 @@ def variable_limits(structure: Structure, numbers: Numbers, end_velocity: Array)
         first, last = ranges[name]
         low[nodes, first:last], high[nodes, first:last] = between
 
-    identity = pack_element(structure.group, np.eye(structure.group.degree))
+    identity = packed_elements(structure.group, np.eye(structure.group.degree))
     limit("X", 0, (identity, identity))
     if second is not None:
         limit("xi", slice(None), second.speeds)

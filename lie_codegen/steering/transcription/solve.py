@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from lie_codegen.arrays import Array
+from lie_codegen.groups.maps.packed_arrays import packed_elements
 from lie_codegen.steering.constraints import Ball, Cone
 from lie_codegen.steering.obstacles.lowest import lowest
 from lie_codegen.steering.obstacles.tunnels import tunnels
-from lie_codegen.steering.packing import pack_element
 from lie_codegen.steering.task import Task
 from lie_codegen.steering.transcription.flow import SimulatedPath, simulated_path
 from lie_codegen.steering.transcription.layout import (
@@ -226,7 +226,7 @@ def _solve(bench: Workbench, name: str, margins: Array, aim: ProgramEnd, start: 
 
 def _parameters(bench: Workbench, margins: Array, aim: Array) -> Array:
     numbers, group = bench.numbers, bench.task.group
-    parts: list[Any] = [pack_element(group, aim), numbers.drift, numbers.weights]
+    parts: list[Any] = [packed_elements(group, aim), numbers.drift, numbers.weights]
     for obstacle, margin in zip(numbers.obstacles, margins, strict=True):
         if isinstance(obstacle, Cone | Ball):
             values = list(obstacle.parameters())
@@ -235,7 +235,7 @@ def _parameters(bench: Workbench, margins: Array, aim: Array) -> Array:
             one = obstacle.solid()
             values = [*one.centers[0], *one.axes[0].T.ravel(), *one.halves[0], *one.tubes, one.rounding[0] + margin]
         parts.append(values)
-    parts += [pack_element(group, element) for element in numbers.via]
+    parts += [packed_elements(group, element) for element in numbers.via]
     parts.append(np.minimum(np.minimum(-numbers.rates[0], numbers.rates[1]), 1e6))
     if numbers.dynamics is not None:
         parts += [numbers.dynamics.inertia.ravel(), np.linalg.inv(numbers.dynamics.inertia).ravel()]
