@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from lie_codegen.algebra.constructions import _coordinate_map
-from lie_codegen.exact.numbers import Number
+from lie_codegen.exact.numbers import Number, domain_matrix, to_numbers
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.on_demand import sympy as sp
 
@@ -49,6 +49,12 @@ class RealMatrices:
         return tuple((tuple(sorted(part)), self._orthogonal(sorted(part))) for part in parts)
 
     @cached_property
+    def kept(self) -> tuple[sp.ImmutableMatrix | None, ...]:
+        """For each block a form S with X^T S X = S whose rows and columns have one entry each, so that X^{-1} = S^{-1} X^T S is read off X:
+        of SO(p, q), Sp(2 n) and their like. None where there is none."""
+        return tuple(self._kept(sorted(block)) for block, _ in self.blocks)
+
+    @cached_property
     def coordinates(self) -> tuple[dict[tuple[int, int], Number], ...]:
         """For each component the exact coefficients on matrix entries that read it off: x_k = sum c (i, j) A_ij."""
         columns = [list(m.flat()) for m in self.basis]
@@ -72,6 +78,35 @@ class RealMatrices:
 
     def _orthogonal(self, block: list[int]) -> bool:
         return all(m[i, j] == -m[j, i] for m in self.basis for i in block for j in block)
+
+    def _kept(self, block: list[int]) -> sp.ImmutableMatrix | None:
+        size = len(block)
+        if size == 1 or not self._traceless(block):
+            return None
+        parts = [m.extract(block, block) for m in self.basis]
+        if self._orthogonal(block):
+            return sp.ImmutableMatrix(sp.eye(size))
+        # A^T S + S A = 0, entry by entry.
+        equations = []
+        for A in parts:
+            for i in range(size):
+                for j in range(size):
+                    row: list[Number] = [sp.S.Zero] * (size * size)
+                    for k in range(size):
+                        row[k * size + j] += A[k, i]
+                        row[i * size + k] += A[k, j]
+                    if any(row):
+                        equations.append(row)
+        found = to_numbers(domain_matrix(equations).nullspace().to_dense()) if equations else []
+        for flat in found:
+            S = sp.ImmutableMatrix(size, size, list(flat))
+            single = all(sum(entry != 0 for entry in S.row(i)) == 1 for i in range(size))
+            if single and all(sum(entry != 0 for entry in S.col(i)) == 1 for i in range(size)):
+                return S
+        return None
+
+    def _traceless(self, block: list[int]) -> bool:
+        return all(sp.expand(sum(m[i, i] for i in block)) == 0 for m in self.basis)
 
 
 def real_form(matrix: sp.MatrixBase, is_complex: bool) -> sp.MatrixBase:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
-from kernel_calls import adjoint_matrix, call, kernel, load, unflatten
+from kernel_calls import adjoint_matrix, call, call_group, kernel, load, unflatten
 
 import lie_codegen as lc
 from lie_codegen.codegen.tape import tape_of
@@ -284,3 +284,16 @@ def test_larger_members_of_the_families(name: str) -> None:
     series = scipy.linalg.expm(np.block([[ad, np.eye(n)], [np.zeros((n, 2 * n))]]))[:n, n:]
     np.testing.assert_allclose(call(name, "rjac", -x), series, atol=1e-13)
     np.testing.assert_allclose(call(name, "ljac_inv", x) @ series, np.eye(n), atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["so31", "so_2_2", "sp4", "sp6", "sl2"])
+def test_what_keeps_a_form_is_inverted_without_cancelling(name: str) -> None:
+    """X^{-1} = S^{-1} X^T S moves entries: inverting twice gives X bit for bit, also where |X| |X^{-1}| is 1e10 and X^{-1} by the
+    adjugate has no digit left."""
+    group = lc.group(name)
+    x = np.random.default_rng(12).normal(size=group.dim)
+    x *= 8 / np.max(np.abs(np.linalg.eigvals(group.hat(x))))
+    X, back = scipy.linalg.expm(group.hat(x)), scipy.linalg.expm(-group.hat(x))
+    inverse = call_group(group, "inverse", X)
+    np.testing.assert_array_equal(call_group(group, "inverse", inverse), X)
+    np.testing.assert_allclose(inverse, back, atol=1e-11 * np.max(np.abs(back)))

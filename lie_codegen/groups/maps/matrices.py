@@ -15,6 +15,7 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.kernel.linear import Matrix, Vector, cross, dot, matmul, matvec, minus, number, plus, scaled
 from lie_codegen.kernel.structural_zeros import add, product
+from lie_codegen.on_demand import sympy as sp
 
 
 class GroupMatrices:
@@ -38,17 +39,17 @@ class GroupMatrices:
         return [[Complex(matrix[i][j], matrix[i + d][j]) for j in range(d)] for i in range(d)]
 
     def inverse(self, X: Matrix) -> Matrix:
-        """X^{-1} by blocks; an orthogonal block by its transpose."""
+        """X^{-1} by blocks; a block that keeps a form S by S^{-1} X^T S, an orthogonal one by its transpose: whatever its entries, nothing cancels."""
         size = self.real.size
         rows: dict[int, Vector] = {}
-        for block, orthogonal in self.real.blocks:
+        for (block, _), form in zip(self.real.blocks, self.real.kept, strict=True):
             right = []
             for i in block:
                 row: Vector = [int(i == j) for j in range(size)]
                 for other, solved in rows.items():
                     row = minus(row, scaled(X[i][other], solved))
                 right.append(row)
-            inverse = self._block_inverse([[X[i][j] for j in block] for i in block], orthogonal)
+            inverse = self._block_inverse([[X[i][j] for j in block] for i in block], form)
             for i, row in zip(block, matmul(inverse, right), strict=True):
                 rows[i] = row
         return [rows[i] for i in range(size)]
@@ -88,10 +89,17 @@ class GroupMatrices:
             result[place] = entry
         return result
 
-    def _block_inverse(self, block: Matrix, orthogonal: bool) -> Matrix:
-        if orthogonal:
-            return [list(column) for column in zip(*block, strict=True)]
+    def _block_inverse(self, block: Matrix, form: sp.ImmutableMatrix | None) -> Matrix:
         size = len(block)
+        if form is not None:
+            place = [next(j for j in range(size) if form[i, j] != 0) for i in range(size)]
+            # (S^{-1} X^T S)_{s(i) s(j)} = S_{j s(j)} / S_{i s(i)} X_{j i}
+            rows: Matrix = [[0] * size for _ in range(size)]
+            for i in range(size):
+                for j in range(size):
+                    weight = sp.radsimp(form[j, place[j]] / form[i, place[i]])
+                    rows[place[i]][place[j]] = product(number(self.ops, weight), block[j][i])
+            return rows
         sparse = {(i, j): block[i][j] for i in range(size) for j in range(size) if not _is_zero(block[i][j])}
         columns = solve(sparse, [{j: 1} for j in range(size)], size)
         return [[column.get(i, 0) for column in columns] for i in range(size)]
