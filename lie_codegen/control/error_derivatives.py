@@ -13,8 +13,9 @@ from typing import Any
 
 from lie_codegen.control.error_function import ErrorFunction, ErrorSymbols
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
+from lie_codegen.groups.maps.checked_log import log_coordinates
 from lie_codegen.groups.maps.exponential import jacobian
-from lie_codegen.groups.maps.log_routine import closed_log, log_coordinates
+from lie_codegen.groups.maps.log_routine import closed_log
 from lie_codegen.groups.maps.matrices import GroupMatrices
 from lie_codegen.groups.matrix_pattern import RealMatrices
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar

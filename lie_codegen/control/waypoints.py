@@ -12,8 +12,8 @@ from lie_codegen.control.reference_motion import WaypointReference
 from lie_codegen.errors import InputError, ShapeError
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.admission import admitted
+from lie_codegen.groups.maps.checked_log import log_coordinates
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex

@@ -22,9 +22,9 @@ from typing import Any
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
+from lie_codegen.groups.maps.checked_log import log_coordinates
 from lie_codegen.groups.maps.defect import defect
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.maps.renormalise import renormalised
 from lie_codegen.groups.matrix_group import MatrixGroup

@@ -337,3 +337,19 @@ def test_two_routines_of_one_group_share_their_helpers(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert subprocess.run(["./example"], cwd=folder).returncode == 0
+
+
+@pytest.mark.parametrize("real", ["so2", "se2", "so3", "se3", "gl2", "sim3", "so4", "so31"])
+def test_real_blocks_beside_complex_ones(real: str) -> None:
+    """exp leads back; an imaginary part in a real block, or in an entry that is 0, is no element."""
+    group = lc.product(real, "su2")
+    x = 0.4 * np.random.default_rng(11).normal(size=group.dim)
+    X = scipy.linalg.expm(group.hat(x))
+    log = compiled(group)
+    np.testing.assert_allclose(log(X), x, atol=1e-12)
+    np.testing.assert_allclose(log.batch(np.array([X] * 9))[8], x, atol=1e-12)
+    d = lc.group(real).degree
+    for place in np.ndindex(d, d):
+        off = X.astype(complex)
+        off[place] += 1e-3j
+        assert np.all(np.isnan(log(off)))

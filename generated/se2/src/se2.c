@@ -186,78 +186,137 @@ static void se2_log_error(const double x[3], const double X[9], double u[3], dou
     const double t118 = t90 * t9;
     const double t119 = t117 - t118;
     const double t121 = t119 + (-1.0);
-    const double t122 = t121 * t121;
-    const double t123 = t92 + t104;
-    const double t124 = t123 * t123;
-    const double t125 = t122 + t124;
-    const double t126 = t102 - t104;
-    const double t127 = t126 * t126;
-    const double t128 = t125 + t127;
+    const double t122 = fabs(t121);
+    const double t123 = fabs(t92);
+    const double t124 = t122 + t123;
+    const double t125 = fabs(t109);
+    const double t126 = t124 + t125;
+    const double t127 = fabs(t102);
+    const double t128 = t126 + t127;
     const double t129 = t50 * t7;
     const double t130 = t81 * t4;
     const double t131 = t129 - t130;
     const double t132 = t100 * t10;
     const double t133 = t131 + t132;
     const double t134 = t133 + (-1.0);
-    const double t135 = t134 * t134;
+    const double t135 = fabs(t134);
     const double t136 = t128 + t135;
-    const double t137 = t9 * t9;
+    const double t137 = fabs(t114);
     const double t138 = t136 + t137;
-    const double t139 = t10 * t10;
+    const double t139 = fabs(t9);
     const double t140 = t138 + t139;
-    const double t141 = t11 + (-1.0);
-    const double t142 = t141 * t141;
-    const double t143 = t140 + t142;
-    const double t144 = sqrt(t143);
-    const double t145 = fabs(t3);
-    const double t146 = fabs(t4);
-    const double t147 = (double)(t145 < t146);
-    const double t148 = t147 != 0.0 ? t146 : t145;
-    const double t149 = fabs(t5);
-    const double t150 = (double)(t148 < t149);
-    const double t151 = t150 != 0.0 ? t149 : t148;
+    const double t141 = fabs(t10);
+    const double t142 = t140 + t141;
+    const double t143 = t11 + (-1.0);
+    const double t144 = fabs(t143);
+    const double t145 = t142 + t144;
+    const double t147 = (double)(t145 < HUGE_VAL);
+    const double t148 = fabs(t50);
+    const double t149 = fabs(t3);
+    const double t150 = t148 * t149;
+    const double t151 = fabs(t81);
     const double t152 = fabs(t6);
-    const double t153 = (double)(t151 < t152);
-    const double t154 = t153 != 0.0 ? t152 : t151;
-    const double t155 = fabs(t7);
-    const double t156 = (double)(t154 < t155);
-    const double t157 = t156 != 0.0 ? t155 : t154;
-    const double t158 = fabs(t8);
-    const double t159 = (double)(t157 < t158);
-    const double t160 = t159 != 0.0 ? t158 : t157;
-    const double t161 = fabs(t9);
-    const double t162 = (double)(t160 < t161);
-    const double t163 = t162 != 0.0 ? t161 : t160;
-    const double t164 = fabs(t10);
-    const double t165 = (double)(t163 < t164);
-    const double t166 = t165 != 0.0 ? t164 : t163;
-    const double t167 = fabs(t11);
-    const double t168 = (double)(t166 < t167);
-    const double t169 = t168 != 0.0 ? t167 : t166;
-    const double t170 = fabs(t50);
-    const double t171 = fabs(t81);
-    const double t172 = (double)(t170 < t171);
-    const double t173 = t172 != 0.0 ? t171 : t170;
-    const double t174 = fabs(t90);
-    const double t175 = (double)(t173 < t174);
-    const double t176 = t175 != 0.0 ? t174 : t173;
-    const double t177 = (double)(t176 < t171);
-    const double t178 = t177 != 0.0 ? t171 : t176;
-    const double t179 = (double)(t178 < t170);
-    const double t180 = t179 != 0.0 ? t170 : t178;
-    const double t181 = fabs(t100);
-    const double t182 = (double)(t180 < t181);
-    const double t183 = t182 != 0.0 ? t181 : t180;
-    const double t184 = (double)(t183 < 1.0);
-    const double t185 = t184 != 0.0 ? 1.0 : t183;
-    const double t186 = t169 * t185;
+    const double t153 = t151 * t152;
+    const double t154 = t150 + t153;
+    const double t155 = fabs(t90);
+    const double t156 = t155 * t139;
+    const double t157 = t154 + t156;
+    const double t158 = (double)(1.0 < t157);
+    const double t159 = t158 != 0.0 ? t157 : 1.0;
+    const double t160 = t122 / t159;
+    const double t161 = t92 + t104;
+    const double t162 = fabs(t161);
+    const double t163 = fabs(t4);
+    const double t164 = t148 * t163;
+    const double t165 = fabs(t7);
+    const double t166 = t151 * t165;
+    const double t167 = t164 + t166;
+    const double t168 = t155 * t141;
+    const double t169 = t167 + t168;
+    const double t170 = (double)(1.0 < t169);
+    const double t171 = t170 != 0.0 ? t169 : 1.0;
+    const double t172 = t162 / t171;
+    const double t173 = (double)(t160 < t172);
+    const double t174 = t173 != 0.0 ? t172 : t160;
+    const double t176 = (double)(t174 < 0.0);
+    const double t177 = (double)(t176 == 0.0);
+    const double t178 = t177 != 0.0 ? t174 : 0.0;
+    const double t179 = t102 - t104;
+    const double t180 = fabs(t179);
+    const double t181 = t151 * t149;
+    const double t182 = t148 * t152;
+    const double t183 = t181 + t182;
+    const double t184 = fabs(t100);
+    const double t185 = t184 * t139;
+    const double t186 = t183 + t185;
     const double t187 = (double)(1.0 < t186);
     const double t188 = t187 != 0.0 ? t186 : 1.0;
+    const double t189 = t180 / t188;
+    const double t190 = (double)(t178 < t189);
+    const double t191 = t190 != 0.0 ? t189 : t178;
+    const double t192 = t151 * t163;
+    const double t193 = t148 * t165;
+    const double t194 = t192 + t193;
+    const double t195 = t184 * t141;
+    const double t196 = t194 + t195;
+    const double t197 = (double)(1.0 < t196);
+    const double t198 = t197 != 0.0 ? t196 : 1.0;
+    const double t199 = t135 / t198;
+    const double t200 = (double)(t191 < t199);
+    const double t201 = t200 != 0.0 ? t199 : t191;
+    const double t202 = (double)(t201 < 0.0);
+    const double t203 = (double)(t202 == 0.0);
+    const double t204 = t203 != 0.0 ? t201 : 0.0;
+    const double t205 = (double)(1.0 < t139);
+    const double t206 = t205 != 0.0 ? t139 : 1.0;
+    const double t207 = t139 / t206;
+    const double t208 = (double)(t204 < t207);
+    const double t209 = t208 != 0.0 ? t207 : t204;
+    const double t210 = (double)(1.0 < t141);
+    const double t211 = t210 != 0.0 ? t141 : 1.0;
+    const double t212 = t141 / t211;
+    const double t213 = (double)(t209 < t212);
+    const double t214 = t213 != 0.0 ? t212 : t209;
+    const double t215 = fabs(t11);
+    const double t216 = (double)(1.0 < t215);
+    const double t217 = t216 != 0.0 ? t215 : 1.0;
+    const double t218 = t144 / t217;
+    const double t219 = (double)(t214 < t218);
+    const double t220 = t219 != 0.0 ? t218 : t214;
+    const double t222 = t147 != 0.0 ? t220 : (double)NAN;
+    const double t223 = fabs(t104);
+    const double t224 = t223 / t171;
+    const double t225 = fabs(t5);
+    const double t226 = t148 * t225;
+    const double t227 = fabs(t8);
+    const double t228 = t151 * t227;
+    const double t229 = t226 + t228;
+    const double t230 = t155 * t215;
+    const double t231 = t229 + t230;
+    const double t232 = (double)(1.0 < t231);
+    const double t233 = t232 != 0.0 ? t231 : 1.0;
+    const double t234 = t125 / t233;
+    const double t235 = (double)(t224 < t234);
+    const double t236 = t235 != 0.0 ? t234 : t224;
+    const double t237 = t223 / t188;
+    const double t238 = (double)(t236 < t237);
+    const double t239 = t238 != 0.0 ? t237 : t236;
+    const double t240 = t151 * t225;
+    const double t241 = t148 * t227;
+    const double t242 = t240 + t241;
+    const double t243 = t184 * t215;
+    const double t244 = t242 + t243;
+    const double t245 = (double)(1.0 < t244);
+    const double t246 = t245 != 0.0 ? t244 : 1.0;
+    const double t247 = t137 / t246;
+    const double t248 = (double)(t239 < t247);
+    const double t249 = t248 != 0.0 ? t247 : t239;
+    const double t250 = t147 != 0.0 ? t249 : (double)NAN;
     u[0] = t104;
     u[1] = t109;
     u[2] = t114;
-    error[0] = t144;
-    error[1] = t188;
+    error[0] = t222;
+    error[1] = t250;
 }
 
 
@@ -365,26 +424,19 @@ static int se2_log_checked_newton(const double *x, const double *u, double *y)
 }
 
 /* x is taken if exp(hat x) = X (1 + hat u) with u of the size of rounding, after Newton steps as long as u falls: the fixed point is the logarithm
-   of the nearest element. error = (distance from the group, |X| |X^-1|). */
+   of the nearest element. error = (distance from the group, size of u), both relative to what rounding is measured by. */
 static int se2_log_checked_certified(const double *X, double *x)
 {
-    double u[3], error[2], size = 0.0, next;
+    double u[3], error[2];
     int k, step;
     se2_log_error(x, X, u, error);
-    for (k = 0; k < 3; ++k) {
-        size = fabs(u[k]) <= size ? size : fabs(u[k]);
-    }
-    for (step = 0; step < 3 && !(size <= 4e-15 * error[1]); ++step) {
+    for (step = 0; step < 3 && !(error[1] <= 4e-15); ++step) {
         double y[3], v[3], fresh[2];
         if (!se2_log_checked_newton(x, u, y)) {
             break;
         }
         se2_log_error(y, X, v, fresh);
-        next = 0.0;
-        for (k = 0; k < 3; ++k) {
-            next = fabs(v[k]) <= next ? next : fabs(v[k]);
-        }
-        if (!(next < size)) {
+        if (!(fresh[1] < error[1])) {
             break;
         }
         for (k = 0; k < 3; ++k) {
@@ -393,9 +445,8 @@ static int se2_log_checked_certified(const double *X, double *x)
         }
         error[0] = fresh[0];
         error[1] = fresh[1];
-        size = next;
     }
-    return size <= 1e-12 * error[1] && error[0] <= 1e-05 * error[1];
+    return error[1] <= 1e-12 && error[0] <= 1e-05;
 }
 
 static void se2_log_checked(const double *X, double *x)
@@ -1145,60 +1196,41 @@ void se2_defect(const double X[9], double defect[1])
     const double t27 = (double)(t25 < HUGE_VAL);
     const double t28 = t1 + t3;
     const double t29 = fabs(t28);
-    const double t31 = (double)(1.0 < t9);
-    const double t32 = t31 != 0.0 ? t9 : 1.0;
-    const double t33 = (double)(t32 < t10);
-    const double t34 = t33 != 0.0 ? t10 : t32;
-    const double t35 = (double)(t34 < t12);
-    const double t36 = t35 != 0.0 ? t12 : t34;
-    const double t37 = (double)(t36 < t14);
-    const double t38 = t37 != 0.0 ? t14 : t36;
-    const double t39 = (double)(t38 < t16);
-    const double t40 = t39 != 0.0 ? t16 : t38;
-    const double t41 = (double)(t40 < t18);
-    const double t42 = t41 != 0.0 ? t18 : t40;
-    const double t43 = (double)(t42 < t20);
-    const double t44 = t43 != 0.0 ? t20 : t42;
-    const double t45 = (double)(t44 < t22);
-    const double t46 = t45 != 0.0 ? t22 : t44;
-    const double t47 = (double)(t46 < t24);
-    const double t48 = t47 != 0.0 ? t24 : t46;
-    const double t49 = t29 / t48;
-    const double t50 = t0 - 1.0;
-    const double t51 = t4 - 1.0;
-    const double t52 = t50 - t51;
-    const double t53 = fabs(t52);
-    const double t54 = t53 / t48;
-    const double t55 = (double)(t49 < t54);
-    const double t56 = t55 != 0.0 ? t54 : t49;
-    const double t57 = t20 / t48;
-    const double t58 = (double)(t56 < t57);
-    const double t59 = t58 != 0.0 ? t57 : t56;
-    const double t60 = t22 / t48;
-    const double t61 = (double)(t59 < t60);
-    const double t62 = t61 != 0.0 ? t60 : t59;
-    const double t63 = t8 - 1.0;
-    const double t64 = fabs(t63);
-    const double t65 = t64 / t48;
-    const double t66 = (double)(t62 < t65);
-    const double t67 = t66 != 0.0 ? t65 : t62;
-    const double t68 = t0 * t4;
-    const double t69 = t1 * t3;
-    const double t70 = t68 - t69;
-    const double t72 = t70 + (-1.0);
-    const double t73 = fabs(t72);
-    const double t74 = t73 / t48;
-    const double t75 = (double)(t67 < t74);
-    const double t76 = t75 != 0.0 ? t74 : t67;
-    const double t78 = (-1e-13) * t48;
-    const double t79 = t78 * t48;
-    const double t80 = (double)(t79 < t70);
-    const double t81 = (double)(t80 == 0.0);
-    const double t83 = t81 != 0.0 ? 2.0 : 0.0;
-    const double t84 = (double)(t76 < t83);
-    const double t85 = t84 != 0.0 ? t83 : t76;
-    const double t87 = t27 != 0.0 ? t85 : (double)NAN;
-    defect[0] = t87;
+    const double t31 = (double)(t9 < t10);
+    const double t32 = t31 != 0.0 ? t10 : t9;
+    const double t33 = (double)(t32 < t14);
+    const double t34 = t33 != 0.0 ? t14 : t32;
+    const double t35 = (double)(t34 < t16);
+    const double t36 = t35 != 0.0 ? t16 : t34;
+    const double t37 = (double)(1.0 < t36);
+    const double t38 = t37 != 0.0 ? t36 : 1.0;
+    const double t39 = t29 / t38;
+    const double t40 = t0 - 1.0;
+    const double t41 = t4 - 1.0;
+    const double t42 = t40 - t41;
+    const double t43 = fabs(t42);
+    const double t44 = t43 / t38;
+    const double t45 = (double)(t39 < t44);
+    const double t46 = t45 != 0.0 ? t44 : t39;
+    const double t47 = (double)(t46 < t20);
+    const double t48 = t47 != 0.0 ? t20 : t46;
+    const double t49 = (double)(t48 < t22);
+    const double t50 = t49 != 0.0 ? t22 : t48;
+    const double t51 = t8 - 1.0;
+    const double t52 = fabs(t51);
+    const double t53 = (double)(t50 < t52);
+    const double t54 = t53 != 0.0 ? t52 : t50;
+    const double t55 = t0 * t4;
+    const double t56 = t1 * t3;
+    const double t57 = t55 - t56;
+    const double t59 = t57 + (-1.0);
+    const double t60 = fabs(t59);
+    const double t61 = t38 * t38;
+    const double t62 = t60 / t61;
+    const double t63 = (double)(t54 < t62);
+    const double t64 = t63 != 0.0 ? t62 : t54;
+    const double t66 = t27 != 0.0 ? t64 : (double)NAN;
+    defect[0] = t66;
 }
 
 void se2_renormalise(const double X[9], double Y[9])

@@ -240,100 +240,84 @@ static void so3_log_error(const double x[3], const double X[9], double u[3], dou
     const double t149 = t122 * t9;
     const double t150 = t148 + t149;
     const double t152 = t150 + (-1.0);
-    const double t153 = t152 * t152;
-    const double t154 = t137 + t145;
-    const double t155 = t154 * t154;
-    const double t156 = t153 + t155;
-    const double t157 = t124 - t132;
-    const double t158 = t157 * t157;
-    const double t159 = t156 + t158;
-    const double t160 = t143 - t145;
-    const double t161 = t160 * t160;
-    const double t162 = t159 + t161;
-    const double t163 = t87 * t4;
-    const double t164 = t91 * t7;
-    const double t165 = t163 + t164;
-    const double t166 = t97 * t10;
-    const double t167 = t165 + t166;
-    const double t168 = t167 + (-1.0);
-    const double t169 = t168 * t168;
-    const double t170 = t162 + t169;
-    const double t171 = t99 + t114;
-    const double t172 = t171 * t171;
-    const double t173 = t170 + t172;
-    const double t174 = t130 + t132;
-    const double t175 = t174 * t174;
-    const double t176 = t173 + t175;
-    const double t177 = t112 - t114;
-    const double t178 = t177 * t177;
-    const double t179 = t176 + t178;
-    const double t180 = t104 * t5;
-    const double t181 = t106 * t8;
-    const double t182 = t180 + t181;
-    const double t183 = t110 * t11;
-    const double t184 = t182 + t183;
-    const double t185 = t184 + (-1.0);
-    const double t186 = t185 * t185;
-    const double t187 = t179 + t186;
-    const double t188 = sqrt(t187);
-    const double t189 = fabs(t3);
-    const double t190 = fabs(t4);
-    const double t191 = (double)(t189 < t190);
-    const double t192 = t191 != 0.0 ? t190 : t189;
-    const double t193 = fabs(t5);
-    const double t194 = (double)(t192 < t193);
-    const double t195 = t194 != 0.0 ? t193 : t192;
-    const double t196 = fabs(t6);
-    const double t197 = (double)(t195 < t196);
-    const double t198 = t197 != 0.0 ? t196 : t195;
-    const double t199 = fabs(t7);
-    const double t200 = (double)(t198 < t199);
-    const double t201 = t200 != 0.0 ? t199 : t198;
-    const double t202 = fabs(t8);
-    const double t203 = (double)(t201 < t202);
-    const double t204 = t203 != 0.0 ? t202 : t201;
-    const double t205 = fabs(t9);
-    const double t206 = (double)(t204 < t205);
-    const double t207 = t206 != 0.0 ? t205 : t204;
-    const double t208 = fabs(t10);
-    const double t209 = (double)(t207 < t208);
-    const double t210 = t209 != 0.0 ? t208 : t207;
-    const double t211 = fabs(t11);
-    const double t212 = (double)(t210 < t211);
-    const double t213 = t212 != 0.0 ? t211 : t210;
-    const double t214 = fabs(t117);
-    const double t215 = fabs(t119);
+    const double t153 = fabs(t152);
+    const double t154 = fabs(t137);
+    const double t155 = t153 + t154;
+    const double t156 = fabs(t124);
+    const double t157 = t155 + t156;
+    const double t158 = fabs(t143);
+    const double t159 = t157 + t158;
+    const double t160 = t87 * t4;
+    const double t161 = t91 * t7;
+    const double t162 = t160 + t161;
+    const double t163 = t97 * t10;
+    const double t164 = t162 + t163;
+    const double t165 = t164 + (-1.0);
+    const double t166 = fabs(t165);
+    const double t167 = t159 + t166;
+    const double t168 = fabs(t99);
+    const double t169 = t167 + t168;
+    const double t170 = fabs(t130);
+    const double t171 = t169 + t170;
+    const double t172 = fabs(t112);
+    const double t173 = t171 + t172;
+    const double t174 = t104 * t5;
+    const double t175 = t106 * t8;
+    const double t176 = t174 + t175;
+    const double t177 = t110 * t11;
+    const double t178 = t176 + t177;
+    const double t179 = t178 + (-1.0);
+    const double t180 = fabs(t179);
+    const double t181 = t173 + t180;
+    const double t183 = (double)(t181 < HUGE_VAL);
+    const double t184 = t137 + t145;
+    const double t185 = fabs(t184);
+    const double t186 = (double)(t153 < t185);
+    const double t187 = t186 != 0.0 ? t185 : t153;
+    const double t188 = t124 - t132;
+    const double t189 = fabs(t188);
+    const double t190 = (double)(t187 < t189);
+    const double t191 = t190 != 0.0 ? t189 : t187;
+    const double t192 = t143 - t145;
+    const double t193 = fabs(t192);
+    const double t194 = (double)(t191 < t193);
+    const double t195 = t194 != 0.0 ? t193 : t191;
+    const double t196 = (double)(t195 < t166);
+    const double t197 = t196 != 0.0 ? t166 : t195;
+    const double t198 = t99 + t114;
+    const double t199 = fabs(t198);
+    const double t200 = (double)(t197 < t199);
+    const double t201 = t200 != 0.0 ? t199 : t197;
+    const double t202 = t130 + t132;
+    const double t203 = fabs(t202);
+    const double t204 = (double)(t201 < t203);
+    const double t205 = t204 != 0.0 ? t203 : t201;
+    const double t206 = t112 - t114;
+    const double t207 = fabs(t206);
+    const double t208 = (double)(t205 < t207);
+    const double t209 = t208 != 0.0 ? t207 : t205;
+    const double t210 = (double)(t209 < t180);
+    const double t211 = t210 != 0.0 ? t180 : t209;
+    const double t213 = t183 != 0.0 ? t211 : (double)NAN;
+    const double t214 = fabs(t145);
+    const double t215 = fabs(t132);
     const double t216 = (double)(t214 < t215);
     const double t217 = t216 != 0.0 ? t215 : t214;
-    const double t218 = fabs(t122);
-    const double t219 = (double)(t217 < t218);
-    const double t220 = t219 != 0.0 ? t218 : t217;
-    const double t221 = fabs(t87);
-    const double t222 = (double)(t220 < t221);
-    const double t223 = t222 != 0.0 ? t221 : t220;
-    const double t224 = fabs(t91);
-    const double t225 = (double)(t223 < t224);
-    const double t226 = t225 != 0.0 ? t224 : t223;
-    const double t227 = fabs(t97);
-    const double t228 = (double)(t226 < t227);
-    const double t229 = t228 != 0.0 ? t227 : t226;
-    const double t230 = fabs(t104);
-    const double t231 = (double)(t229 < t230);
-    const double t232 = t231 != 0.0 ? t230 : t229;
-    const double t233 = fabs(t106);
-    const double t234 = (double)(t232 < t233);
-    const double t235 = t234 != 0.0 ? t233 : t232;
-    const double t236 = fabs(t110);
-    const double t237 = (double)(t235 < t236);
-    const double t238 = t237 != 0.0 ? t236 : t235;
-    const double t239 = t213 * t238;
-    const double t240 = (double)(1.0 < t239);
-    const double t241 = t240 != 0.0 ? t239 : 1.0;
+    const double t218 = (double)(t217 < t214);
+    const double t219 = t218 != 0.0 ? t214 : t217;
+    const double t220 = fabs(t114);
+    const double t221 = (double)(t219 < t220);
+    const double t222 = t221 != 0.0 ? t220 : t219;
+    const double t223 = (double)(t222 < t215);
+    const double t224 = t223 != 0.0 ? t215 : t222;
+    const double t225 = (double)(t224 < t220);
+    const double t226 = t225 != 0.0 ? t220 : t224;
+    const double t227 = t183 != 0.0 ? t226 : (double)NAN;
     u[0] = t114;
     u[1] = t132;
     u[2] = t145;
-    error[0] = t188;
-    error[1] = t241;
+    error[0] = t213;
+    error[1] = t227;
 }
 
 
@@ -441,26 +425,19 @@ static int so3_log_checked_newton(const double *x, const double *u, double *y)
 }
 
 /* x is taken if exp(hat x) = X (1 + hat u) with u of the size of rounding, after Newton steps as long as u falls: the fixed point is the logarithm
-   of the nearest element. error = (distance from the group, |X| |X^-1|). */
+   of the nearest element. error = (distance from the group, size of u), both relative to what rounding is measured by. */
 static int so3_log_checked_certified(const double *X, double *x)
 {
-    double u[3], error[2], size = 0.0, next;
+    double u[3], error[2];
     int k, step;
     so3_log_error(x, X, u, error);
-    for (k = 0; k < 3; ++k) {
-        size = fabs(u[k]) <= size ? size : fabs(u[k]);
-    }
-    for (step = 0; step < 3 && !(size <= 4e-15 * error[1]); ++step) {
+    for (step = 0; step < 3 && !(error[1] <= 4e-15); ++step) {
         double y[3], v[3], fresh[2];
         if (!so3_log_checked_newton(x, u, y)) {
             break;
         }
         so3_log_error(y, X, v, fresh);
-        next = 0.0;
-        for (k = 0; k < 3; ++k) {
-            next = fabs(v[k]) <= next ? next : fabs(v[k]);
-        }
-        if (!(next < size)) {
+        if (!(fresh[1] < error[1])) {
             break;
         }
         for (k = 0; k < 3; ++k) {
@@ -469,9 +446,8 @@ static int so3_log_checked_certified(const double *X, double *x)
         }
         error[0] = fresh[0];
         error[1] = fresh[1];
-        size = next;
     }
-    return size <= 1e-12 * error[1] && error[0] <= 1e-05 * error[1];
+    return error[1] <= 1e-12 && error[0] <= 1e-05;
 }
 
 static void so3_log_checked(const double *X, double *x)
@@ -1432,24 +1408,24 @@ void so3_defect(const double X[9], double defect[1])
     const double t75 = fabs(t74);
     const double t76 = (double)(t68 < t75);
     const double t77 = t76 != 0.0 ? t75 : t68;
-    const double t79 = (double)(1.0 < t9);
-    const double t80 = t79 != 0.0 ? t9 : 1.0;
-    const double t81 = (double)(t80 < t10);
-    const double t82 = t81 != 0.0 ? t10 : t80;
-    const double t83 = (double)(t82 < t12);
-    const double t84 = t83 != 0.0 ? t12 : t82;
-    const double t85 = (double)(t84 < t14);
-    const double t86 = t85 != 0.0 ? t14 : t84;
-    const double t87 = (double)(t86 < t16);
-    const double t88 = t87 != 0.0 ? t16 : t86;
-    const double t89 = (double)(t88 < t18);
-    const double t90 = t89 != 0.0 ? t18 : t88;
-    const double t91 = (double)(t90 < t20);
-    const double t92 = t91 != 0.0 ? t20 : t90;
-    const double t93 = (double)(t92 < t22);
-    const double t94 = t93 != 0.0 ? t22 : t92;
-    const double t95 = (double)(t94 < t24);
-    const double t96 = t95 != 0.0 ? t24 : t94;
+    const double t79 = (double)(t9 < t10);
+    const double t80 = t79 != 0.0 ? t10 : t9;
+    const double t81 = (double)(t80 < t12);
+    const double t82 = t81 != 0.0 ? t12 : t80;
+    const double t83 = (double)(t82 < t14);
+    const double t84 = t83 != 0.0 ? t14 : t82;
+    const double t85 = (double)(t84 < t16);
+    const double t86 = t85 != 0.0 ? t16 : t84;
+    const double t87 = (double)(t86 < t18);
+    const double t88 = t87 != 0.0 ? t18 : t86;
+    const double t89 = (double)(t88 < t20);
+    const double t90 = t89 != 0.0 ? t20 : t88;
+    const double t91 = (double)(t90 < t22);
+    const double t92 = t91 != 0.0 ? t22 : t90;
+    const double t93 = (double)(t92 < t24);
+    const double t94 = t93 != 0.0 ? t24 : t92;
+    const double t95 = (double)(1.0 < t94);
+    const double t96 = t95 != 0.0 ? t94 : 1.0;
     const double t97 = t96 * t96;
     const double t98 = t77 / t97;
     const double t100 = (-1e-13) * t96;

@@ -1,7 +1,7 @@
 """What is taken for an element of a group: on it, projected onto it, or refused with the figure that is off.
 
-With kappa = max(1, |X| |X^-1|), the sizes of the largest entries, and `defect` as in `groups.maps.defect`:
-    defect <= 1e-12 kappa    taken as it is;
+With `defect` as in `groups.maps.defect`, relative to the entries that each condition reads:
+    defect <= 1e-12          taken as it is;
     defect <= 1e-5           the nearest element is taken and its distance reported: rotations in single precision and printed
                              with seven digits lie here; so are matrices whose entries are all within 1e-5 of the nearest
                              element's, as printed with five digits (their defect, of second degree in X, is up to twice that);
@@ -22,7 +22,7 @@ from lie_codegen.groups.build import library_of
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.rows import row_by_row
 
-#: On the group to rounding, relative to kappa.
+#: On the group to rounding.
 ON_GROUP = 1e-12
 #: Projected up to here.
 NEAR_GROUP = 1e-5
@@ -52,13 +52,6 @@ def admitted(group: MatrixGroup, X: ArrayLike, where: str) -> Admitted:
     matrix = _matrix(group, X, where)
     off = float(library_of(group).defect(matrix))
     if off <= ON_GROUP:
-        return Admitted(matrix, 0.0)
-    with np.errstate(all="ignore"):
-        try:
-            kappa = max(1.0, float(np.max(np.abs(matrix)) * np.max(np.abs(np.linalg.inv(matrix)))))
-        except np.linalg.LinAlgError:
-            kappa = 1.0
-    if off <= ON_GROUP * kappa:
         return Admitted(matrix, 0.0)
     # what mends and explains is imported for the few elements that are off
     if off <= _DOUBTFUL:

@@ -22,8 +22,8 @@ from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import as_group
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.kernels import group_kernel
+from lie_codegen.groups.maps.checked_log import log_coordinates
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.log_routine import log_coordinates
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar

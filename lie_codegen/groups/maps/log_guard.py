@@ -29,9 +29,16 @@ def off_group_square(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequenc
     flat = [Complex.of(entry) if group.is_complex else entry for row in X for entry in row]
     parts = [z.re for z in flat] + [z.im for z in flat] if group.is_complex else flat
     values: list[Scalar] = []
-    inside = {i * d + j for block in data.log_structure.blocks for i in block.indices for j in block.indices}
+    # What a block looks at itself: of real blocks beside complex ones not the imaginary parts, which are zero.
+    inside = {
+        part * d * d + i * d + j
+        for block in data.log_structure.blocks
+        for part in range(2 if block.is_complex else 1)
+        for i in block.indices
+        for j in block.indices
+    }
     for row in membership(group).linear:
-        if all(k % (d * d) in inside for k in row):
+        if inside.issuperset(row):
             continue
         terms = [
             product(number(ops, weight), add(parts[k], -1) if k < d * d and k % (d + 1) == 0 else parts[k])
@@ -39,7 +46,7 @@ def off_group_square(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequenc
         ]
         values.append(total(terms))
     for block in data.log_structure.blocks:
-        values += _block(block, [[X[i][j] for j in block.indices] for i in block.indices])
+        values += _block(block, block.part(X))
     return total(value * value for value in values) if values else 0 * parts[0]
 
 

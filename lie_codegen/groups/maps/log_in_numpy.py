@@ -23,16 +23,19 @@ from lie_codegen.on_demand import scipy
 
 #: Newton's steps at most; a candidate from the blocks needs none or one, for they are exact but for rounding.
 STEPS = 3
-#: |u| <= RESIDUAL kappa is a logarithm, |u| <= SETTLED kappa cannot be bettered: a few units in the last place.
+#: |hat u| <= RESIDUAL W is a logarithm, |hat u| <= SETTLED W cannot be bettered: a few units in the last place.
 RESIDUAL, SETTLED = 1e-12, 4e-15
 
 
 class NumpyLog:
     """X flat (complex entries as pairs) -> x, or NaN: steps 1 to 4 of `log_routine`, for one X at a time."""
 
-    def __init__(self, data: GroupDerivation, first: Kernel, second: Kernel, distance: float) -> None:
+    def __init__(
+        self, data: GroupDerivation, first: Kernel, second: Kernel, distance: float, residual: float = RESIDUAL
+    ) -> None:
         self.data = data
         self.distance = distance
+        self.residual = residual
         self.first = first
         self.second = second
         self.ops = FloatArithmetic()
@@ -87,22 +90,22 @@ class NumpyLog:
 
         def error(x: Array) -> tuple[Array, float, float]:
             try:
-                u, (distance, kappa) = self.second.evaluate(self.ops, x.tolist(), scalars)
+                u, (distance, size) = self.second.evaluate(self.ops, x.tolist(), scalars)
             except (ValueError, ZeroDivisionError, OverflowError):
                 return np.full(len(x), np.nan), np.nan, np.nan
-            return np.array([float(value) for value in u]), float(distance), float(kappa)
+            return np.array([float(value) for value in u]), float(distance), float(size)
 
-        u, distance, kappa = error(x)
+        u, distance, size = error(x)
         for _ in range(STEPS):
-            if np.max(np.abs(u)) <= SETTLED * kappa:
+            if size <= SETTLED:
                 break
             y = x + np.linalg.solve(right_jacobian(self.data, x), u)
             v, *fresh = error(y)
-            if not np.max(np.abs(v)) < np.max(np.abs(u)):
+            if not fresh[1] < size:
                 break
             x[:] = y
-            u, (distance, kappa) = v, fresh
-        return bool(np.max(np.abs(u)) <= RESIDUAL * kappa and distance <= self.distance * kappa)
+            u, (distance, size) = v, fresh
+        return bool(size <= self.residual and distance <= self.distance)
 
 
 def right_jacobian(data: GroupDerivation, x: Array) -> Array:

@@ -3,12 +3,13 @@
     log X = the x in the algebra with exp(hat x) = X that minimises sum_j (Im mu_j)^2 over the eigenvalues mu_j of hat x.
 
 Where the principal logarithm lies in the algebra it is this one. Where every block of X has a closed form and they do not depend on each other, the
-closed form is exact on all of the group, and membership (`defect`) is its certificate; off the group by rounding of single precision or so, and for
-all other groups, the routine of this file is called:
+closed form is exact on all of the group, and membership (`defect`) is its certificate (`checked_log`); off the group by rounding of single precision or
+so, and for all other groups, the routine of this file is called:
 
     1. a candidate from the blocks: Jacobi rotations of unitary matrices, the real split of orthogonal ones, Schur form and square roots,
     2. E = exp(-hat x) X - 1, u = vee E: Newton's steps x <- x + rjac_inv(x) u as long as u falls,
-    3. x where |u| <= 1e-12 kappa and the distance from the group |E - hat u| <= 1e-5 kappa, kappa = max(1, |X| |X^-1|),
+    3. x where |hat u| <= 1e-12 W and the distance from the group |E - hat u| <= 1e-5 W entry by entry, W = max(1, |exp(-hat x)| |X|) being what
+       rounding of each entry of E is measured by: a rotation is looked at as closely far from the origin as near it,
     4. else every logarithm of X is looked through (`log_lattice`), and NaN where there is none.
 
 The derivative is D log(X)[X hat v] = rjac_inv(x) v on every branch: not that of sweeps, selections and roots.
@@ -24,14 +25,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lie_codegen.groups.derivation import GroupDerivation
-from lie_codegen.groups.maps.defect import defect, largest
 from lie_codegen.groups.maps.exponential import exp_matrix, jacobian
-from lie_codegen.groups.maps.log_guard import off_group_square
 from lie_codegen.groups.maps.log_in_numpy import RESIDUAL, SETTLED, NumpyLog
 from lie_codegen.groups.maps.logarithm import candidate
 from lie_codegen.groups.maps.matrices import GroupMatrices, matrix_port, real_rows
+from lie_codegen.groups.maps.moduli import largest, moduli, parts_of
 from lie_codegen.groups.maps.rkmk import hat_body
-from lie_codegen.kernel.arithmetic import ROUNDOFF, Arithmetic, Scalar, unit_roundoff
+from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, identity, matmul, matvec, total
@@ -39,9 +39,9 @@ from lie_codegen.kernel.plain_data import Definition
 from lie_codegen.kernel.routine import Routine, call_routine
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
-#: The defect up to which a closed form is taken as it is: rounding of the numbers that the kernel is printed for.
-_ROUNDING = {ROUNDOFF["double"]: 1e-13, ROUNDOFF["float"]: 4e-6}
 _DISTANCE = 1e-5
+#: Far from the group Newton's steps shrink u by the distance each: three of them leave the cube of a tenth, and any x will do whose exp is near X.
+_FAR, _FAR_RESIDUAL = 0.1, 1e-3
 
 
 class _Rounding(NamedTuple):
@@ -103,33 +103,14 @@ _SINGLE = _Rounding(
 )
 
 
-def log_coordinates(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector:
-    """The x with exp(hat x) = X, of the nearest element within 1e-5 of the group; NaN where there is none."""
-    entries = [list(row) for row in X]
-    flat = [part for row in entries for entry in row for part in _parts(entry, data.group.is_complex)]
-    if not data.log_structure.is_closed:
-        return call_routine(ops, log_routine(data), flat)
-    x = _whole(ops, data, candidate(ops, data, entries))
-    rounding = _ROUNDING[unit_roundoff(ops)]
-    # Not `less(rounding, defect)`, which is false for NaN.
-    square = off_group_square(ops, data, entries)
-    if square is None:
-        on_group = ops.less(defect(ops, data, entries), ops.constant(rounding))
-    else:
-        on_group = ops.less(square, ops.constant(rounding**2))
-    off_group = ops.less(ops.where(on_group, ops.constant(1), 0), ops.constant(0.5))
-    checked = call_routine(ops, log_routine(data), flat, off_group)
-    return [ops.where(on_group, closed, value) for closed, value in zip(x, checked, strict=True)]
-
-
 def closed_log(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) -> Vector | None:
     """The closed form alone, for an X that is known to be on the group; None where there is none."""
     if not data.log_structure.is_closed:
         return None
-    return _whole(ops, data, candidate(ops, data, [list(row) for row in X]))
+    return whole(ops, data, candidate(ops, data, [list(row) for row in X]))
 
 
-def _whole(ops: Arithmetic, data: GroupDerivation, x: Vector) -> Vector:
+def whole(ops: Arithmetic, data: GroupDerivation, x: Vector) -> Vector:
     """x, NaN in all of its components where one block has no logarithm."""
     partial = {"scale", "real2", "complex2"} | {block.kind for block in data.log_structure.blocks if block.scaled}
     if not any(block.kind in partial for block in data.log_structure.blocks):
@@ -144,15 +125,8 @@ def far_log(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[Any]]) 
     entries = [list(row) for row in X]
     if data.log_structure.is_closed:
         return candidate(ops, data, entries)
-    flat = [part for row in entries for entry in row for part in _parts(entry, data.group.is_complex)]
-    return call_routine(ops, log_routine(data, 0.1), flat)
-
-
-def _parts(entry: Any, is_complex: bool) -> list[Scalar]:
-    if not is_complex:
-        return [entry]
-    z = Complex.of(entry)
-    return [z.re, z.im]
+    flat = [part for row in entries for entry in row for part in parts_of(entry, data.group.is_complex)]
+    return call_routine(ops, log_routine(data, _FAR), flat)
 
 
 @lru_cache(maxsize=64)
@@ -160,6 +134,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
     """The checked logarithm of a group as a routine: X flat (complex entries as pairs) to x; NaN beyond `distance` from the group."""
     group, structure = data.group, data.log_structure
     d, n = group.degree, group.dim
+    far = distance == _FAR
     X, x, u = matrix_port(group, "X"), Port("x", (n,)), Port("u", (n,))
     size = sum(len(block.rows) for block in structure.iterated)
     logs = (Port("logs", (size,)),) if size else ()
@@ -168,7 +143,7 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         return (candidate(ops, data, X, *logs),)
 
     def error(ops: Arithmetic, x: Any, X: Any) -> tuple[Any, ...]:
-        return _error(ops, data, x, X)
+        return off_exponential(ops, data, x, X)
 
     first = Kernel("log_candidate", group.name, (X, *logs), (x,), from_blocks)
     second = Kernel("log_error", group.name, (x, X), (u, Port("error", (2,))), error)
@@ -188,16 +163,16 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         ("blocks", tuple(blocks)),
         ("logs_size", size),
         ("distance", distance),
-        ("rounding", _DOUBLE),
+        ("rounding", _DOUBLE._replace(residual=repr(_FAR_RESIDUAL)) if far else _DOUBLE),
         ("constants", tuple((i, j, k, float(c)) for i, j, k, c in group.algebra.constants())),
         ("candidate_symbol", first.symbol),
         ("error_symbol", second.symbol),
         ("lattice", not structure.is_onto),
         *((f"{each.name.removeprefix('log_')}_symbol", each.symbol) for each in helpers[2:]),
     )
-    twin = NumpyLog(data, first, second, distance)
+    twin = NumpyLog(data, first, second, distance, _FAR_RESIDUAL if far else RESIDUAL)
     return Routine(
-        f"{group.name}_log_checked" if distance == _DISTANCE else f"{group.name}_log_far",
+        f"{group.name}_log_far" if far else f"{group.name}_log_checked",
         d * d * (2 if group.is_complex else 1),
         n,
         "log_routine.c.jinja",
@@ -206,7 +181,10 @@ def log_routine(data: GroupDerivation, distance: float = _DISTANCE) -> Routine:
         twin,
         _tangent(data),
         # Rounding X to floats moves it off the group by a few 1e-7.
-        (("rounding", _SINGLE), ("distance", max(distance, 2e-5))),
+        (
+            ("rounding", _SINGLE._replace(residual=repr(_FAR_RESIDUAL)) if far else _SINGLE),
+            ("distance", max(distance, 2e-5)),
+        ),
     )
 
 
@@ -258,8 +236,8 @@ def _weight(ops: Arithmetic, value: float) -> Scalar:
     return int(value) if value == int(value) else ops.constant(value)
 
 
-def _error(ops: Arithmetic, data: GroupDerivation, x: Vector, X: Any) -> tuple[Any, ...]:
-    """u = vee E, and (|E - hat u|, kappa), for E = exp(-hat x) X - 1."""
+def off_exponential(ops: Arithmetic, data: GroupDerivation, x: Vector, X: Any) -> tuple[Any, ...]:
+    """u = vee E for E = exp(-hat x) X - 1, and the largest entries of E - hat u and of hat u relative to W; NaN where E is not finite."""
     group = data.group
     d = range(group.degree)
     backward = exp_matrix(ops, data, [product(-1, c) for c in x])
@@ -273,13 +251,27 @@ def _error(ops: Arithmetic, data: GroupDerivation, x: Vector, X: Any) -> tuple[A
                     re, im = matrix[i, j].as_real_imag()
                     weight: Any = ops.constant(re) if im == 0 else Complex(ops.constant(re), ops.constant(im))
                     hat[i][j] = add(hat[i][j], c * weight if im == 0 else Complex(c * weight.re, c * weight.im))
-    rest = [part for i in d for j in d for part in _parts(_minus(E[i][j], hat[i][j]), group.is_complex)]
-    distance = ops.sqrt(total(product(part, part) for part in rest))
-    sizes = []
-    for matrix in (X, backward):
-        parts = [part for row in matrix for entry in row for part in _parts(entry, group.is_complex)]
-        sizes.append(largest(ops, [ops.fabs(part) for part in parts if not is_zero(part)]))
-    return u, [distance, largest(ops, [1, sizes[0] * sizes[1]])]
+    rest = [[_minus(a, b) for a, b in zip(p, q, strict=True)] for p, q in zip(E, hat, strict=True)]
+    limits = None if _bounded(data) else matmul(moduli(ops, backward), moduli(ops, X))
+    found = []
+    for each in (rest, hat):
+        sizes = moduli(ops, each)
+        if limits is not None:
+            sizes = [
+                [size if is_zero(size) else size / largest(ops, [1, limit]) for size, limit in zip(a, b, strict=True)]
+                for a, b in zip(sizes, limits, strict=True)
+            ]
+        found.append(largest(ops, [size for row in sizes for size in row]))
+    # Comparisons with NaN are false, and a maximum would lose it.
+    finite = ops.less(total(size for row in moduli(ops, E) for size in row), ops.constant(math.inf))
+    return u, [ops.where(finite, size, ops.constant(math.nan)) for size in found]
+
+
+def _bounded(data: GroupDerivation) -> bool:
+    """Whether all entries of all elements are of modulus 1 at most."""
+    place = {i: number for number, (block, _) in enumerate(data.real.blocks) for i in block}
+    compact = all(place[i] == place[j] for i, j in data.real.varying)
+    return data.is_unitary or (compact and all(orthogonal for _, orthogonal in data.real.blocks))
 
 
 def _minus(a: Any, b: Any) -> Any:

@@ -8,13 +8,16 @@ x lies in the ideal ker T, whose matrices are strictly block triangular; `logari
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from lie_codegen.algebra.lie_algebra import LieAlgebra
 from lie_codegen.exact.block_structure import diagonal_blocks, is_block_diagonal
 from lie_codegen.exact.numbers import Number, domain_matrix, real_coordinates, to_numbers
 from lie_codegen.groups.matrix_group import MatrixGroup
+from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.on_demand import sympy as sp
 
 #: The entries of a 4 x 4 matrix that the closed forms of SO(4) and SO(3, 1) give.
@@ -43,6 +46,18 @@ class LogBlock:
     def is_iterated(self) -> bool:
         """Whether its logarithm needs a loop."""
         return self.kind in ("unitary", "rotation", "matrix")
+
+    @property
+    def is_complex(self) -> bool:
+        """Whether its entries are complex."""
+        return self.kind in ("phase", "spin", "complex2")
+
+    def part(self, X: Sequence[Sequence[Any]]) -> list[list[Any]]:
+        """The block of X; real where its kind is, beside complex ones as in SO(3) x SU(2)."""
+        part = [[X[i][j] for j in self.indices] for i in self.indices]
+        if self.is_complex:
+            return part
+        return [[entry.re if isinstance(entry, Complex) else entry for entry in row] for row in part]
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def block_log(ops: Arithmetic, block: LogBlock, X: Entries) -> list[Scalar]:
     known = carried(X, block.indices)
     if known is not None and not block.scaled:
         return unit_log(ops, known) if block.kind == "space" else full_quaternion_log(ops, known[0], known[1:])
-    part = [[X[i][j] for j in block.indices] for i in block.indices]
+    part = block.part(X)
     if block.kind == "scale":
         return [ops.log(part[0][0])]
     if block.kind == "phase":

@@ -4,11 +4,14 @@ Every X = exp(hat x) ... satisfies
     w . (X - 1) = 0              for w that annihilate the associative algebra that the A_i generate (fixed rows, columns and entries),
     X^H S X = S, X^T S X = S     where A^H S + S A = 0 (A^T S + S A = 0) for every A_i; the dual forms X S X^H = S, X S X^T = S,
     X^T S X = chi(X) S           where A^T S + S A is a multiple of S for every A_i,
-    det X = 1 (|det X| = 1)      where every A_i is traceless (has an imaginary trace),
+    det X = 1 (|det X| = 1)      where every A_i is traceless (has an imaginary trace), and so of the diagonal blocks of X,
     X A_i X^{-1} in the algebra.
 The matrices that satisfy a set of these form a group; where the linearised conditions leave n dimensions, it is the group itself up to
 components. So conditions are taken, the cheap ones first, until n dimensions are left. Components are told apart by signs that are constant on
 a connected group: of the determinant of every real diagonal block, and of an indefinite form on its own positive subspace.
+
+Where they leave more, what ties the blocks together is no polynomial: a spiral e^{a t} R(t), a screw, dilations by e^t and e^{2 t}. Then
+X exp(-log X) = 1 is looked at, with the logarithm read from some of the blocks.
 """
 
 from __future__ import annotations
@@ -36,16 +39,18 @@ class Membership:
     Attributes:
         linear: rows w on the entries (real parts row by row, then for a complex group the imaginary parts): w . (X - 1) = 0.
         forms: the forms kept, and those that are kept up to a factor.
-        determinant: "one", "unit modulus" or "".
+        determinants: rows (and columns) whose determinant is "one" or of "unit modulus".
         normaliser: whether X A_i X^{-1} has to be looked at.
+        logarithm: whether X exp(-log X) has to be looked at, too.
         blocks: index sets whose determinant is real and positive.
         oriented: indefinite real symmetric forms, each with a basis (columns) of its positive subspace.
     """
 
     linear: tuple[dict[int, Number], ...]
     forms: tuple[Form, ...]
-    determinant: str
+    determinants: tuple[tuple[tuple[int, ...], str], ...]
     normaliser: bool
+    logarithm: bool
     blocks: tuple[tuple[int, ...], ...]
     oriented: tuple[tuple[Form, tuple[tuple[float, ...], ...]], ...]
 
@@ -57,22 +62,29 @@ def membership(group: MatrixGroup) -> Membership:
     tangent = _TangentSpace(group)
     linear = _annihilator(group, generators)
     tangent.add(_linear_rows(linear, tangent.width))
-    determinant = _determinant(group)
-    traces = _trace_rows(group, determinant) if determinant else np.zeros((0, tangent.width))
+    known = _determinants(group)
+    rows = [(each, _trace_rows(group, *each)) for each in known]
+    determinants = []
     # SL(n): the determinant alone, before forms that say the same in more words.
-    alone = bool(determinant) and not tangent.complete and tangent.would_complete(traces)
-    if alone:
-        tangent.add(traces)
+    if rows and not tangent.complete and tangent.would_complete(np.concatenate([row for _, row in rows])):
+        determinants = [each for each, row in rows if not tangent.complete and tangent.add(row)]
     forms: list[Form] = []
     for form in () if tangent.complete else kept_forms(group, generators):
         if tangent.add(_form_rows(form, group)):
             forms.append(form)
         if tangent.complete:
             break
-    if not alone and (tangent.complete or not tangent.add(traces)):
-        determinant = ""
+    determinants += [each for each, row in rows if not tangent.complete and tangent.add(row)]
     normaliser = not tangent.complete and tangent.add(_normaliser_rows(group))
-    return Membership(linear, tuple(forms), determinant, normaliser, _signed_blocks(group, linear), _oriented(forms))
+    return Membership(
+        linear,
+        tuple(forms),
+        tuple(determinants),
+        normaliser,
+        not tangent.complete,
+        _signed_blocks(group, linear),
+        _oriented(forms),
+    )
 
 
 class _TangentSpace:
@@ -154,8 +166,8 @@ def blocks_suffice(group: MatrixGroup, *, scaled: bool) -> bool:
 
         if len(block) > 1:
             tangent.add(_rows_of(group, even))
-    if membership(group).determinant:
-        tangent.add(_trace_rows(group, membership(group).determinant))
+    for block, kind in membership(group).determinants:
+        tangent.add(_trace_rows(group, block, kind))
     return tangent.complete
 
 
@@ -189,16 +201,22 @@ def _form_rows(form: Form, group: MatrixGroup) -> Array:
     return _rows_of(group, condition)
 
 
-def _determinant(group: MatrixGroup) -> str:
-    traces = [sp.expand(matrix.trace()) for matrix in group.exact_basis]
-    if not any(traces):
-        return "one"
-    return "unit modulus" if all(sp.re(trace) == 0 for trace in traces) else ""
+def _determinants(group: MatrixGroup) -> list[tuple[tuple[int, ...], str]]:
+    """Diagonal blocks, and then all of X, whose determinant is 1 or of modulus 1."""
+    result = []
+    whole = tuple(range(group.degree))
+    for rows in dict.fromkeys((*map(tuple, diagonal_blocks(group.exact_basis)), whole)):
+        traces = [sp.expand(sum(matrix[i, i] for i in rows)) for matrix in group.exact_basis]
+        if not any(traces):
+            result.append((rows, "one"))
+        elif all(sp.re(trace) == 0 for trace in traces):
+            result.append((rows, "unit modulus"))
+    return result
 
 
-def _trace_rows(group: MatrixGroup, kind: str) -> Array:
+def _trace_rows(group: MatrixGroup, rows: tuple[int, ...], kind: str) -> Array:
     def trace(Y: NDArray[Any]) -> NDArray[Any]:
-        value = complex(np.trace(Y))
+        value = complex(sum(Y[i, i] for i in rows))
         return np.array([[value if kind == "one" else complex(value.real)]])
 
     return _rows_of(group, trace)

@@ -50,7 +50,7 @@ def renormalised(ops: Arithmetic, data: GroupDerivation, X: Sequence[Sequence[An
         element = _on_the_envelope(ops, data, element)
     blocks = [block for block, _ in data.real.blocks if len(block) > 1]
     forms = conditions.forms
-    if conditions.normaliser:
+    if conditions.normaliser or conditions.logarithm:
         return exp_matrix(ops, data, far_log(ops, data, X))
     if not forms:
         pass
@@ -157,28 +157,32 @@ def _on_the_envelope(ops: Arithmetic, data: GroupDerivation, X: Matrix) -> Matri
 
 def _of_determinant_one(ops: Arithmetic, data: GroupDerivation, conditions: Membership, X: Matrix) -> Matrix:
     """The diagonal blocks that vary times det^{-1/n}, n their size together; the phase alone where a form holds |det|."""
-    if not conditions.determinant or (conditions.determinant == "unit modulus" and conditions.forms):
-        return X
-    varying = [
-        block
-        for block in diagonal_blocks(data.group.exact_basis)
-        if any(matrix[i, i] != 0 for matrix in data.group.exact_basis for i in block) or len(block) > 1
-    ]
-    share = number(ops, sp.Rational(-1, sum(map(len, varying))))
-    z = Complex.of(determinant(X))
-    factor: Any = ops.exp(share * ops.log(z.re)) if not data.group.is_complex else _root(ops, conditions, z, share)
     result = [list(row) for row in X]
-    for block in varying:
-        for i in block:
-            for j in block:
-                entry = result[i][j]
-                result[i][j] = entry if isinstance(entry, int) and entry == 0 else entry * factor
+    for rows, kind in conditions.determinants:
+        if kind == "unit modulus" and conditions.forms:
+            continue
+        varying = [
+            block
+            for block in diagonal_blocks(data.group.exact_basis)
+            if set(block) <= set(rows)
+            and (any(matrix[i, i] != 0 for matrix in data.group.exact_basis for i in block) or len(block) > 1)
+        ]
+        share = number(ops, sp.Rational(-1, sum(map(len, varying))))
+        z = Complex.of(determinant([[result[i][j] for j in rows] for i in rows]))
+        factor: Any = (
+            _root(ops, conditions, kind, z, share) if data.group.is_complex else ops.exp(share * ops.log(z.re))
+        )
+        for block in varying:
+            for i in block:
+                for j in block:
+                    entry = result[i][j]
+                    result[i][j] = entry if isinstance(entry, int) and entry == 0 else entry * factor
     return result
 
 
-def _root(ops: Arithmetic, conditions: Membership, z: Complex, share: Scalar) -> Any:
+def _root(ops: Arithmetic, conditions: Membership, kind: str, z: Complex, share: Scalar) -> Any:
     size: Scalar = 1 if conditions.forms else ops.exp(share * ops.log(z.re * z.re + z.im * z.im) / 2)
-    if conditions.determinant == "unit modulus":
+    if kind == "unit modulus":
         return size
     angle = share * ops.atan2(z.im, z.re)
     return Complex(product(size, ops.cos(angle)), product(size, ops.sin(angle)))
