@@ -153,7 +153,15 @@ def cosets(group: MatrixGroup, target: Any, where: str) -> tuple[Array, Array]:
     Raises:
         As `end_of`.
     """
-    end = end_of(group, target, where)
+    return cosets_of(group, end_of(group, target, where), where)
+
+
+def cosets_of(group: MatrixGroup, end: End, where: str) -> tuple[Array, Array]:
+    """`cosets` of a goal that is given as its equations.
+
+    Raises:
+        As `cosets`.
+    """
     if end.elements is None:
         slopes = np.array([(A @ end.right).ravel() for A in group.basis])
         _, sizes, across = np.linalg.svd(slopes.T)

@@ -22,6 +22,7 @@ from lie_codegen.steering.direct.certificates import certificate
 from lie_codegen.steering.direct.programme import Settings
 from lie_codegen.steering.direct.scene import CLEAR, ENOUGH, STRAIGHT, Result, Scene
 from lie_codegen.steering.direct.sharper import sharper
+from lie_codegen.steering.goals import cosets_of
 from lie_codegen.steering.obstacles.blocked import refuse_blocked
 from lie_codegen.steering.obstacles.keep_out import KeepOut
 from lie_codegen.steering.plan import Plan, Status
@@ -175,9 +176,10 @@ def refuse_blocked_ends(task: Manoeuvre, obstacles: Sequence[Obstacle], where: s
     Raises:
         InfeasibleError: one is inside an obstacle.
     """
-    places = [("start", np.real(task.system.start))]
-    end = task.end
-    if end.elements is not None and not len(end.before) and not len(end.after):
-        places.append(("target", np.real(end.elements[0])))
+    group = task.system.group
+    elements, free = cosets_of(group, task.end, where)
+    places = [("start", np.real(task.system.start), np.zeros((0, group.dim)))]
+    if len(elements) == 1:
+        places.append(("target", np.real(elements[0]), free))
     named = [(f"obstacle {number} ({type(each).__name__})", each) for number, each in enumerate(obstacles, start=1)]
-    refuse_blocked(where, places, named)
+    refuse_blocked(where, group, places, named)

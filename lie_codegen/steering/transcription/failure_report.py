@@ -40,11 +40,14 @@ def refuse_blocked_states(task: Task, numbers: Numbers) -> None:
     Raises:
         InfeasibleError: one is inside an obstacle.
     """
-    places = [("start", np.eye(task.group.degree))]
-    if not task.freedom:
-        places.append(("target", task.target))
-    places += [(f"via point {number}", element) for number, element in enumerate(numbers.via, start=1)]
-    refuse_blocked(f"steer({task.group.name})", places, zip(numbers.obstacle_names, numbers.obstacles, strict=True))
+    fixed: Array = np.zeros((0, task.group.dim))
+    places: list[tuple[str, Array, Array]] = [
+        ("start", np.eye(task.group.degree), fixed),
+        ("target", task.target, fixed if task.free is None else task.free),
+    ]
+    places += [(f"via point {number}", element, fixed) for number, element in enumerate(numbers.via, start=1)]
+    named = zip(numbers.obstacle_names, numbers.obstacles, strict=True)
+    refuse_blocked(f"steer({task.group.name})", task.group, places, named)
 
 
 def _needs(task: Task, structure: Structure, numbers: Numbers, v: Array) -> list[str]:
