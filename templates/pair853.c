@@ -347,7 +347,7 @@ EXPORT void pair_within(Pair *p, ptrdiff_t count, const ptrdiff_t *from, const d
 EXPORT ptrdiff_t between_size(ptrdiff_t group, ptrdiff_t size);
 EXPORT ptrdiff_t between_size(ptrdiff_t group, ptrdiff_t size)
 {
-    return 4 * (size - group) + fours(group) * (TURN_NODES + 2) + 9 * group + turn_room(group);
+    return (NODES + 1) * (size - group) + fours(group) * (TURN_NODES + 2) + 9 * group + turn_room(group);
 }
 
 /* The polynomials about one step. */
@@ -409,31 +409,34 @@ static APART void prepare_between(const Pair *p, ptrdiff_t steps, ptrdiff_t s, B
 }
 
 /*
- * States at all wanted times, which lie within the `steps` steps of a run that is done. What is left away with the last terms
- * of an interpolant errs more than it does; where that is more than `most` times what a step may err, a step of its own goes there.
+ * States at so many times within the `steps` steps of a run that is done. What is left away with the last terms of an interpolant errs
+ * more than it does; where that is more than `most` times what a step may err, a step of its own goes there. Returns the largest of what was left.
  */
-EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most);
-EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
+static double states_at(Pair *p, ptrdiff_t steps, double most, ptrdiff_t count, const double *times, double *X_out, double *y_out)
 {
     const Room room = room_of(p);
     const ptrdiff_t n = p->group, rest = p->size - n;
+    const double end = p->times[p->count - 1];
     Between b;
     ptrdiff_t s = 0, made = -1;
-    b.behind.before = p->dense;
-    b.behind.last = b.behind.before + rest;
-    b.turn = b.behind.last + rest;
+    double *left, *theta, *last, largest = 0.0;
+    b.behind.c = p->dense;
+    left = b.behind.c + NODES * rest;
+    b.turn = left + rest;
     b.spare = b.turn + TURN_NODES * fours(n);
+    theta = b.spare + 9 * n + turn_room(n);
+    last = theta + fours(n);
     memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
-    for (ptrdiff_t w = 0; w < p->count; ++w) {
-        const double t = p->times[w];
-        double *X = p->X_out + w * p->packed, *y = p->y_out + w * p->size, part;
-        int good;
+    for (ptrdiff_t w = 0; w < count; ++w, X_out += p->packed, y_out += p->size) {
+        const double t = times[w];
+        double part;
         while (s + 1 < steps && p->knot_t[s + 1] <= t) {
             ++s;
         }
-        part = w + 1 == p->count ? 1.0 : (t - p->knot_t[s]) / p->knot_h[s];
+        part = t < end ? (t - p->knot_t[s]) / p->knot_h[s] : 1.0;
         if (steps + 1 >= KNOTS) {
-            double *theta = b.spare + 9 * n + turn_room(n), *behind = theta + fours(n), *last = behind + rest, *after = last + fours(n);
+            double most_left = 0.0;
+            int good = 1;
             if (made != s) {
                 prepare_between(p, steps, s, &b);
                 made = s;
@@ -441,29 +444,38 @@ EXPORT void pair_between(Pair *p, ptrdiff_t steps, double most)
             if (n) {
                 newton_at(n, b.turn_place, b.turn, part, theta, last);
             }
-            hermite_at(&b.behind, rest, p->knot_h[s], part, behind, after);
-            good = 1;
+            hermite_at(&b.behind, rest, part, y_out + n, left);
             for (ptrdiff_t i = 0; i < n; ++i) {
                 good &= fabs(last[i]) <= most * (p->atol + p->rtol);
+                most_left = fabs(last[i]) > most_left ? fabs(last[i]) : most_left;
             }
             for (ptrdiff_t i = 0; i < rest; ++i) {
-                good &= fabs(after[i]) <= most * (p->atol + p->rtol * size_of(p, n + i, fabs(behind[i])));
+                good &= fabs(left[i]) <= most * (p->atol + p->rtol * size_of(p, n + i, fabs(y_out[n + i])));
+                most_left = fabs(left[i]) > most_left ? fabs(left[i]) : most_left;
             }
             if (good) {
+                largest = most_left > largest ? most_left : largest;
                 if (p->lift) {
-                    settle(p, X, behind);
-                    express(p, NULL, behind, X);
+                    settle(p, X_out, y_out);
+                    express(p, NULL, y_out, X_out);
                 } else {
-                    memcpy(X, p->knot_X + b.centre * p->packed, (size_t)p->packed * sizeof(double));
-                    settle(p, X, theta);
+                    memcpy(X_out, p->knot_X + b.centre * p->packed, (size_t)p->packed * sizeof(double));
+                    settle(p, X_out, theta);
+                    memset(y_out, 0, (size_t)n * sizeof(double));
                 }
-                memset(y, 0, (size_t)n * sizeof(double));
-                memcpy(y + n, behind, (size_t)rest * sizeof(double));
                 continue;
             }
         }
-        afresh(p, s, part, X, y);
+        afresh(p, s, part, X_out, y_out);
     }
+    return largest;
+}
+
+/* The same at all times that are wanted. */
+EXPORT double pair_between(Pair *p, ptrdiff_t steps, double most);
+EXPORT double pair_between(Pair *p, ptrdiff_t steps, double most)
+{
+    return states_at(p, steps, most, p->count, p->times, p->X_out, p->y_out);
 }
 
 /* From the start, X then y, at this tolerance; where states between steps are interpolated to the last time, which alone is wanted on the way. */
@@ -485,27 +497,28 @@ static Pair from_start(const Pair *p, const double *start, const double *toleran
     return run;
 }
 
-/* The largest |a - b| and the largest |a|; NaN where there is one. */
-static APART void compare(ptrdiff_t n, const double *a, const double *b, double *apart, double *size)
+/* The largest |a - b|, b = 0 if NULL, and at least so much; NaN where there is one. */
+static APART double farthest(ptrdiff_t n, const double *a, const double *b, double least)
 {
-    double off[FOUR] = {0.0}, far[FOUR] = {0.0}, all[FOUR] = {0.0}; /* four at a time; a sum is NaN if a term is, and of these none cancel */
-    for (ptrdiff_t i = 0; i < n; i += FOUR) {
-        const ptrdiff_t from = i + FOUR <= n ? i : n > FOUR ? n - FOUR : 0; /* the last four perhaps again */
-        const ptrdiff_t most = n < FOUR ? n : FOUR;
-        for (ptrdiff_t l = 0; l < most; ++l) {
-            const double d = fabs(a[from + l] - b[from + l]), x = fabs(a[from + l]);
+    double off[EIGHT] = {0.0}, all[EIGHT] = {0.0}; /* a sum is NaN if a term is, and of these none cancel */
+    ptrdiff_t i = 0;
+    for (; i + EIGHT <= n; i += EIGHT) {
+        for (int l = 0; l < EIGHT; ++l) {
+            const double d = fabs(a[i + l] - (b ? b[i + l] : 0.0));
             off[l] = d > off[l] ? d : off[l];
-            far[l] = x > far[l] ? x : far[l];
             all[l] += d;
         }
     }
-    for (int l = 1; l < FOUR; ++l) {
-        off[0] = off[l] > off[0] ? off[l] : off[0];
-        far[0] = far[l] > far[0] ? far[l] : far[0];
-        all[0] += all[l];
+    for (; i < n; ++i) {
+        const double d = fabs(a[i] - (b ? b[i] : 0.0));
+        off[0] = d > off[0] ? d : off[0];
+        all[0] += d;
     }
-    *apart = all[0] != all[0] ? all[0] : off[0];
-    *size = all[0] != all[0] ? all[0] : far[0];
+    for (int l = 0; l < EIGHT; ++l) {
+        least = off[l] > least ? off[l] : least;
+        least = all[l] != all[l] ? all[l] : least;
+    }
+    return least;
 }
 
 /* The stages of a step of each of two runs of one system, in turn: neither waits for the other, and a processor has both under way. */
@@ -523,30 +536,85 @@ static void advance_both(Pair *const *p, const Course *c)
     }
 }
 
-/*
- * A run of one member at each of two tolerances (relative, absolute; of the run with longer steps, of `p`; then by how much p keeps Theta
- * shorter, so that it differs where the reach is what limits steps). The other run has all that it works with `apart` doubles behind that of p, and
- * gives its states to `other`, first those of X. Found: how far they are from those of p, X and y, the size of these, and the steps of the other.
- */
-EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, ptrdiff_t apart, double *other, double *found);
-EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *tolerances, ptrdiff_t most_steps, double most, ptrdiff_t apart, double *other, double *found)
+/* So many knots, a row each: t, h, X, y. */
+static void rows_of_knots(const Pair *p, ptrdiff_t count, double *to)
 {
-    const ptrdiff_t elements = p->count * p->packed, vectors = p->count * p->size;
-    Pair coarse = *p, runs[2], *both[2] = {runs, runs + 1};
+    const ptrdiff_t elements = kept(p);
+    for (ptrdiff_t k = 0; k < count; ++k) {
+        to[0] = p->knot_t[k];
+        to[1] = p->knot_h[k];
+        memcpy(to + 2, p->knot_X + k * elements, (size_t)elements * sizeof(double));
+        memcpy(to + 2 + elements, p->knot_y + k * p->size, (size_t)p->size * sizeof(double));
+        to += 2 + elements + p->size;
+    }
+}
+
+/* One member at two tolerances. What it points to may serve call after call: of the system nothing is written to but its arrays. */
+typedef struct {
+    const Pair *pair;    /* with room for all that is written; X_out, y_out begin with the start, times with its time: `count` of them */
+    const double *start; /* X, then y */
+    double tolerance[4]; /* relative and absolute, of the run with longer steps, of the one that is given */
+    double shorter;      /* by how much the other keeps Theta shorter, so that it differs where the reach is what limits steps */
+    double most;         /* of pair_between */
+    ptrdiff_t apart;     /* the first run has all that it works with so many doubles behind that of the pair */
+    double *other;       /* its states at the times behind the first, X before y; as many X behind */
+    double *knots;       /* of the run that is given, row by row: t, h, X, y */
+    double *found;       /* the largest difference of the two runs, the largest entry; steps of the first; steps, those rejected, evaluations of the other, what its interpolation left away */
+} Twice;
+
+/*
+ * How far the states of two runs are apart: at the times that are wanted; or, where states between steps are known and these are fewer, where the
+ * steps of the first end, at which it is as good as it gets.
+ */
+static double difference(const Twice *w, const Pair *fine, Pair *runs)
+{
+    const ptrdiff_t elements = fine->packed, vectors = fine->size;
+    ptrdiff_t count = fine->count;
+    double *X = w->other, *y = X + count * elements, *X_ends = y + count * vectors;
+    const double *X_fine = fine->X_out, *y_fine = fine->y_out;
+    if (fine->knot_slope && runs[0].steps < count) {
+        count = runs[0].steps;
+        states_at(runs + 1, runs[1].steps, w->most, count, runs[0].knot_t + 1, X, y);
+        X_fine = X;
+        y_fine = y;
+        y = runs[0].knot_y + vectors;
+        for (ptrdiff_t k = 0; k < count; ++k) {
+            express(runs, runs[0].knot_X + (k + 1) * kept(runs), y + k * vectors, X_ends + k * elements);
+        }
+        X = X_ends;
+    } else if (fine->knot_slope) {
+        states_at(runs, runs[0].steps, w->most, count, fine->times, X, y);
+    }
+    return farthest(count * elements, X_fine, X, farthest(count * vectors, y_fine, y, 0.0));
+}
+
+EXPORT ptrdiff_t pair_twice(const Twice *w);
+EXPORT ptrdiff_t pair_twice(const Twice *w)
+{
+    Pair fine = *w->pair, coarse, runs[2], *both[2] = {runs, runs + 1};
     Course course[2];
     ptrdiff_t status[2];
     double **const parts[] = {&coarse.X, &coarse.y, &coarse.work, &coarse.dense, &coarse.knot_t, &coarse.knot_h, &coarse.knot_X, &coarse.knot_y, &coarse.knot_slope, &coarse.knot_theta};
+    memcpy(fine.X_out, w->start, (size_t)fine.packed * sizeof(double));
+    memcpy(fine.y_out, w->start + fine.packed, (size_t)fine.size * sizeof(double));
+    fine.t = fine.times[0];
+    fine.longest = fine.times[fine.count - 1] - fine.t;
+    --fine.count;
+    ++fine.times;
+    fine.X_out += fine.packed;
+    fine.y_out += fine.size;
+    coarse = fine;
     for (size_t k = 0; k < sizeof parts / sizeof parts[0]; ++k) {
-        *parts[k] += *parts[k] ? apart : 0;
+        *parts[k] += *parts[k] ? w->apart : 0;
     }
-    coarse.X_out = other;
-    coarse.y_out = other + elements;
-    runs[0] = from_start(&coarse, start, tolerances);
-    runs[1] = from_start(p, start, tolerances + 2);
-    runs[1].reach *= tolerances[4];
+    coarse.X_out = w->other;
+    coarse.y_out = w->other + fine.count * fine.packed;
+    runs[0] = from_start(&coarse, w->start, w->tolerance);
+    runs[1] = from_start(&fine, w->start, w->tolerance + 2);
+    runs[1].reach *= w->shorter;
     for (int r = 0; r < 2; ++r) {
         begin(both[r], course + r);
-        status[r] = propose(both[r], course + r, most_steps);
+        status[r] = propose(both[r], course + r, fine.room);
     }
     while (status[0] == GO || status[1] == GO) {
         if (status[0] == GO && status[1] == GO) {
@@ -558,29 +626,25 @@ EXPORT ptrdiff_t pair_twice(Pair *p, const double *start, const double *toleranc
         }
         for (int r = 0; r < 2; ++r) {
             if (status[r] == GO && (status[r] = conclude(both[r], course + r)) == GO) {
-                status[r] = propose(both[r], course + r, most_steps);
+                status[r] = propose(both[r], course + r, fine.room);
             }
         }
     }
     for (int r = 0; r < 2; ++r) {
-        const Pair *all = r ? p : &coarse;
         if (status[r] != DONE) {
             return status[r];
         }
-        runs[r].times = p->times;
-        runs[r].count = p->count;
-        runs[r].X_out = all->X_out;
-        runs[r].y_out = all->y_out;
-        if (p->knot_slope) {
-            pair_between(both[r], runs[r].steps, most);
-        }
+        runs[r].times = fine.times;
+        runs[r].count = fine.count;
     }
-    compare(elements, p->X_out, coarse.X_out, found, found + 2);
-    compare(vectors, p->y_out, coarse.y_out, found + 1, found + 3);
-    found[4] = (double)runs[0].steps;
-    p->steps = runs[1].steps;
-    p->rejected = runs[1].rejected;
-    p->evaluations = runs[1].evaluations;
+    w->found[6] = fine.knot_slope ? states_at(runs + 1, runs[1].steps, w->most, fine.count, fine.times, fine.X_out, fine.y_out) : 0.0;
+    w->found[0] = difference(w, &fine, runs);
+    w->found[1] = farthest(fine.count * fine.packed, fine.X_out, NULL, farthest(fine.count * fine.size, fine.y_out, NULL, 0.0));
+    w->found[2] = (double)runs[0].steps;
+    w->found[3] = (double)runs[1].steps;
+    w->found[4] = (double)runs[1].rejected;
+    w->found[5] = (double)runs[1].evaluations;
+    rows_of_knots(&fine, runs[1].steps, w->knots);
     return DONE;
 }
 

@@ -16,7 +16,7 @@
 
 #include "pair_step.h"
 
-enum { KNOTS = 6, TURNS = 3, TURN_NODES = 3 * TURNS, FOUR = 4 };
+enum { KNOTS = 6, TURNS = 3, TURN_NODES = 3 * TURNS, FOUR = 4, EIGHT = 8 };
 
 /* [A_i, A_j] = sum_k c A_k of so many (i, j, k), i < j. */
 typedef struct {
@@ -116,14 +116,14 @@ static void turn_jet(const Brackets *g, const double *theta, const double *xi, c
 }
 
 /*
- * Hermite's polynomial through values and slopes at the KNOTS places, in lengths h of a step: the same weights for all entries. With
- * l_k the polynomials of Lagrange, s_k = l_k'(x_k), the value at x is sum_k l_k^2 ((1 - 2 s_k (x - x_k)) y_k + (x - x_k) h y_k').
+ * Hermite's polynomial through values and slopes at the KNOTS places, in lengths h of a step, in Newton's form: its nodes are the places one
+ * after another, each twice.
  */
+enum { NODES = 2 * KNOTS };
 typedef struct {
     double place[KNOTS];
-    double steep[KNOTS], scale[KNOTS];           /* s_k, 1/prod_j (x_k - x_j) */
-    const double *value[KNOTS], *slope[KNOTS];   /* n entries each */
-    double *before, *last;                       /* the last two terms of Newton's form, whose nodes are the places one after another, each twice */
+    const double *value[KNOTS], *slope[KNOTS]; /* n entries each */
+    double *c;                                 /* coefficients, n entries a node */
 } Hermite;
 
 /* Four doubles anywhere in an array: of loops over local arrays gcc 12 makes scalar sums. */
@@ -133,102 +133,98 @@ typedef double Quad __attribute__((vector_size(32), aligned(8), may_alias));
 typedef double Quad;
 #endif
 
-/* sum_k a_k y_k + b_k y_k', MANY entries from the first on. */
-#define WEIGHED(MANY, TYPE)                                                                         \
-    static inline void weighed_##MANY(const Hermite *p, const double *a, const double *b, ptrdiff_t first, double *to) \
+#if defined(__GNUC__) && !defined(__clang__)
+#define UNROLLED _Pragma("GCC unroll 12")
+#elif defined(__clang__)
+#define UNROLLED _Pragma("clang loop unroll(full)")
+#else
+#define UNROLLED
+#endif
+
+/* Of MANY entries from the first on: the coefficients, and the value at a place `away` from each of the knots. */
+#define HERMITE(MANY, TYPE)                                                                         \
+    static inline void hermite_##MANY(const Hermite *p, ptrdiff_t n, double over[KNOTS][KNOTS], double h, ptrdiff_t first) \
     {                                                                                               \
         enum { PARTS = MANY * sizeof(double) / sizeof(TYPE) };                                      \
-        TYPE sum[PARTS], more[PARTS];                                                               \
-        int k, l;                                                                                   \
+        int i, j, l;                                                                                \
         for (l = 0; l < PARTS; ++l) {                                                               \
-            sum[l] = more[l] = (TYPE){0.0};                                                         \
-        }                                                                                           \
-        for (k = 0; k < KNOTS; ++k) {                                                               \
-            for (l = 0; l < PARTS; ++l) {                                                           \
-                sum[l] += a[k] * ((const TYPE *)(p->value[k] + first))[l];                          \
-                more[l] += b[k] * ((const TYPE *)(p->slope[k] + first))[l];                         \
+            TYPE c[NODES];                                                                          \
+            UNROLLED                                                                                \
+            for (i = 0; i < NODES; ++i) {                                                           \
+                c[i] = ((const TYPE *)(p->value[i / 2] + first))[l];                                \
+            }                                                                                       \
+            UNROLLED                                                                                \
+            for (j = 1; j < NODES; ++j) {                                                           \
+                UNROLLED                                                                            \
+                for (i = NODES - 1; i >= j; --i) { /* two nodes that follow each other may be one place */ \
+                    c[i] = j == 1 && i % 2 ? h * ((const TYPE *)(p->slope[i / 2] + first))[l] : over[i / 2][(i - j) / 2] * (c[i] - c[i - 1]); \
+                }                                                                                   \
+            }                                                                                       \
+            UNROLLED                                                                                \
+            for (i = 0; i < NODES; ++i) {                                                           \
+                ((TYPE *)(p->c + i * n + first))[l] = c[i];                                         \
             }                                                                                       \
         }                                                                                           \
+    }                                                                                               \
+    static inline void hermite_at_##MANY(const Hermite *p, ptrdiff_t n, const double *away, double few, ptrdiff_t first, double *value, double *left) \
+    {                                                                                               \
+        enum { PARTS = MANY * sizeof(double) / sizeof(TYPE) };                                      \
+        int i, l;                                                                                   \
         for (l = 0; l < PARTS; ++l) {                                                               \
-            ((TYPE *)(to + first))[l] = sum[l] + more[l];                                           \
+            TYPE sum = ((const TYPE *)(p->c + (NODES - 1) * n + first))[l];                         \
+            UNROLLED                                                                                \
+            for (i = NODES - 2; i >= 0; --i) {                                                      \
+                sum = ((const TYPE *)(p->c + i * n + first))[l] + away[i / 2] * sum;                \
+                if (i == NODES - 2) {                                                               \
+                    ((TYPE *)(left + first))[l] = few * sum;                                        \
+                }                                                                                   \
+            }                                                                                       \
+            ((TYPE *)(value + first))[l] = sum;                                                     \
         }                                                                                           \
     }
-WEIGHED(1, double)
-WEIGHED(4, Quad)
+HERMITE(1, double)
+HERMITE(4, Quad)
 
-/* The same of n entries: four at a time, the last four perhaps again. */
-static APART void weighed(const Hermite *p, const double *a, const double *b, ptrdiff_t n, double *to)
+/* What `hermite_at` needs of places, values and slopes: four entries at a time, the last four perhaps again. */
+static APART void hermite(const Hermite *p, ptrdiff_t n, double h)
 {
+    double over[KNOTS][KNOTS];
     ptrdiff_t i = 0;
+    for (int k = 1; k < KNOTS; ++k) {
+        for (int j = 0; j < k; ++j) {
+            over[k][j] = 1.0 / (p->place[k] - p->place[j]);
+        }
+    }
     for (; i + FOUR <= n; i += FOUR) {
-        weighed_4(p, a, b, i, to);
+        hermite_4(p, n, over, h, i);
     }
     if (i < n && n >= FOUR) {
-        weighed_4(p, a, b, n - FOUR, to);
+        hermite_4(p, n, over, h, n - FOUR);
         return;
     }
     for (; i < n; ++i) {
-        weighed_1(p, a, b, i, to);
+        hermite_1(p, n, over, h, i);
     }
 }
 
-/*
- * What `hermite_at` needs of places, values and slopes. A divided difference is a sum of residues: with all places twice that of f/prod_j
- * (x - x_j)^2, in which 1/prod_(j != k) (x - x_j)^2 has at x_k the value W_k = scale_k^2 and the slope -2 s_k W_k; with the last place once, one
- * factor (x_k - x_last) more.
- */
-static void hermite(Hermite *p, ptrdiff_t n, double h)
+/* The value at x, and in `left` what the last two terms add to it: without them there is one knot less. */
+static APART void hermite_at(const Hermite *p, ptrdiff_t n, double x, double *value, double *left)
 {
-    enum { LAST = KNOTS - 1 };
-    double a[KNOTS], b[KNOTS];
-    int k, j;
-    for (k = 0; k < KNOTS; ++k) {
-        p->steep[k] = 0.0;
-        p->scale[k] = 1.0;
-    }
-    for (k = 1; k < KNOTS; ++k) {
-        for (j = 0; j < k; ++j) {
-            const double over = 1.0 / (p->place[k] - p->place[j]);
-            p->steep[k] += over;
-            p->steep[j] -= over;
-            p->scale[k] *= over;
-            p->scale[j] *= -over;
-        }
-    }
-    for (k = 0; k < KNOTS; ++k) {
-        const double W = p->scale[k] * p->scale[k];
-        a[k] = -2.0 * p->steep[k] * W;
-        b[k] = h * W;
-    }
-    weighed(p, a, b, n, p->last);
-    for (k = 0; k < KNOTS; ++k) {
-        const double apart = p->place[k] - p->place[LAST], W = p->scale[k] * p->scale[k];
-        a[k] = apart * a[k] + W;
-        b[k] *= apart;
-    }
-    weighed(p, a, b, n, p->before);
-}
-
-/* The value at x, and in `left` what the last two terms of Newton's form add to it: without them there is one knot less. */
-static APART void hermite_at(const Hermite *p, ptrdiff_t n, double h, double x, double *value, double *left)
-{
-    double away[KNOTS], others[KNOTS], a[KNOTS], b[KNOTS], low = 1.0, high = 1.0, few = 1.0;
-    int k;
-    for (k = 0; k < KNOTS; ++k) {
+    double away[KNOTS], few = 1.0;
+    ptrdiff_t i = 0;
+    for (int k = 0; k < KNOTS; ++k) {
         away[k] = x - p->place[k];
-        others[k] = low * p->scale[k];
-        few = low; /* in the end without the last place */
-        low *= away[k];
+        few *= k < KNOTS - 1 ? away[k] * away[k] : 1.0;
     }
-    for (k = KNOTS - 1; k >= 0; --k) {
-        const double l = others[k] * high, square = l * l;
-        high *= away[k];
-        a[k] = square * (1.0 - 2.0 * p->steep[k] * away[k]);
-        b[k] = h * square * away[k];
+    for (; i + FOUR <= n; i += FOUR) {
+        hermite_at_4(p, n, away, few, i, value, left);
     }
-    weighed(p, a, b, n, value);
-    for (ptrdiff_t i = 0; i < n; ++i) {
-        left[i] = few * few * (p->before[i] + away[KNOTS - 1] * p->last[i]);
+    if (i < n && n >= FOUR) {
+        hermite_at_4(p, n, away, few, n - FOUR, value, left);
+        return;
+    }
+    for (; i < n; ++i) {
+        hermite_at_1(p, n, away, few, i, value, left);
     }
 }
 

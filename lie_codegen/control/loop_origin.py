@@ -88,7 +88,7 @@ class LoopOrigin(Saved):
         if self.knots:
             X, y = self.knots[2:]
             nothing = np.empty((0, 1, X.shape[1])), np.empty((0, 1, y.shape[1]))
-            pair = PairRun(*nothing, len(X), 0, 0, float("nan"), *self.knots)
+            pair = PairRun(*nothing, len(X), 0, 0, float("nan"), 0.0, np.column_stack(self.knots))
         return LoopMaking(run, model, reference, self.rtol, self.parts, pair)
 
 

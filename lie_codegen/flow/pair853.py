@@ -7,9 +7,9 @@ what they add up to is judged by a second run at another tolerance, so that the 
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from math import nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.errors import ComputationError
 from lie_codegen.flow.pair_lanes import run_lanes
-from lie_codegen.flow.pair_library import DONE, FULL, MANY, compiled_pair, refuse
+from lie_codegen.flow.pair_library import DONE, FULL, MANY, Twice, compiled_pair, refuse
 from lie_codegen.flow.pair_system import System
 from lie_codegen.runtime.outputs import empty
 from lie_codegen.runtime.threads import share_out
@@ -42,12 +42,13 @@ _BETWEEN, _BETWEEN_SHORT = 2.0, 4.0
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Doubles of a line of memory: vectors that lie across two take longer.
 _LINE = 8
+#: Times up to which a system keeps the memory of a run: half a megabyte.
+_MOST_TIMES_KEPT = 4096
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
 
 
-@dataclass(frozen=True, eq=False)
-class PairRun:
+class PairRun(NamedTuple):
     """States at times, of N members, and the steps of one.
 
     Attributes:
@@ -56,7 +57,9 @@ class PairRun:
         evaluations: of the rate, of many members eight at a time.
         error_estimate: of the entries of X and y: the difference to a run with longer steps, over what the tolerances of the two
             promise; of many members that of the pilot.
-        knot_t, knot_h, knot_X, knot_y: the start, the length and the state of every step of a single member; else empty.
+        left: what interpolation between steps may add to the error.
+        knots: (steps, 2 + m + size) the start, the length and the state of every step of a single member: `knot_t`, `knot_h`, `knot_X`,
+            `knot_y`; else (0, ...).
     """
 
     X: Array
@@ -65,27 +68,44 @@ class PairRun:
     rejected: int
     evaluations: int
     error_estimate: float
-    knot_t: Array
-    knot_h: Array
-    knot_X: Array
-    knot_y: Array
+    left: float
+    knots: Array
+
+    @property
+    def knot_t(self) -> Array:
+        """When the steps begin."""
+        return np.ascontiguousarray(self.knots[:, 0])
+
+    @property
+    def knot_h(self) -> Array:
+        """How long they are."""
+        return np.ascontiguousarray(self.knots[:, 1])
+
+    @property
+    def knot_X(self) -> Array:
+        """X where they begin; nothing where y holds it."""
+        return np.ascontiguousarray(self.knots[:, 2 : self.knots.shape[1] - self.y.shape[-1]])
+
+    @property
+    def knot_y(self) -> Array:
+        """y where they begin."""
+        return np.ascontiguousarray(self.knots[:, self.knots.shape[1] - self.y.shape[-1] :])
 
     def estimated(self, error: float) -> PairRun:
         """The same with this estimate of its error."""
-        counts = self.steps, self.rejected, self.evaluations
-        return PairRun(self.X, self.y, *counts, error, self.knot_t, self.knot_h, self.knot_X, self.knot_y)
+        return PairRun(self.X, self.y, self.steps, self.rejected, self.evaluations, error, self.left, self.knots)
 
     def within(self, system: System, knots: NDArray[np.intp], parts: Array) -> tuple[Array, Array]:
         """X and y the fractions `parts` of the way through the steps `knots`, by fresh steps of a single member."""
-        if self.knot_X.shape[1] != system.kept:  # from a file of before states were kept as elements
+        if self.knots.shape[1] != 2 + system.kept + system.size:  # from a file of before states were kept as elements
             return self._lifted(system).within(system, knots, parts)
         at = np.ascontiguousarray(knots, dtype=np.intp)
         part = np.ascontiguousarray(parts, dtype=float)
         X, y = np.empty((len(at), system.packed)), np.empty((len(at), system.size))
-        given = system.record()
+        given, columns = system.record(), (self.knot_t, self.knot_h, self.knot_X, self.knot_y)
         work = system.work()
-        given.knot_t, given.knot_h = self.knot_t.ctypes.data, self.knot_h.ctypes.data
-        given.knot_X, given.knot_y, given.work = self.knot_X.ctypes.data, self.knot_y.ctypes.data, work.ctypes.data
+        given.knot_t, given.knot_h, given.knot_X, given.knot_y = (each.ctypes.data for each in columns)
+        given.work = work.ctypes.data
         library = compiled_pair()
         library.pair_within(
             ctypes.addressof(given), len(at), at.ctypes.data, part.ctypes.data, X.ctypes.data, y.ctypes.data
@@ -94,15 +114,16 @@ class PairRun:
 
     def _lifted(self, system: System) -> PairRun:
         """The same with the elements of the knots in y instead of Theta = 0 and X beside it."""
-        lift, vectors = system.lift, system.size - system.group
-        behind = self.knot_y[:, self.knot_y.shape[1] - vectors :]
-        elements = np.array([lift(X) for X in self.knot_X]) if lift is not None else self.knot_y[:, :0]
-        return replace(self, knot_X=self.knot_X[:, :0], knot_y=np.concatenate([elements, behind], axis=1))
+        lift, vectors, y = system.lift, system.size - system.group, self.knot_y
+        elements = np.array([lift(X) for X in self.knot_X]) if lift is not None else y[:, :0]
+        knots = np.concatenate([self.knots[:, :2], elements, y[:, y.shape[1] - vectors :]], axis=1)
+        return self._replace(y=np.empty((0, 1, system.size)), knots=knots)
 
     def at(self, system: System, times: Array) -> tuple[Array, Array]:
         """X and y at times within the run of a single member."""
-        knots = np.searchsorted(self.knot_t, times, side="right") - 1
-        return self.within(system, knots, (times - self.knot_t[knots]) / self.knot_h[knots])
+        begun = self.knot_t
+        knots = np.searchsorted(begun, times, side="right") - 1
+        return self.within(system, knots, (times - begun[knots]) / self.knot_h[knots])
 
 
 def integrate(
@@ -148,29 +169,24 @@ def _to_tolerance(
     share = (_FREE_SHARE if system.lift is None else _FREE_SHARE_SHORT) if free else 1.0
     found = None
     if one:
-        both = (*_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO), _SHORTER if free else 1.0)
-        found = _twice(system, X0, y0, times, both)
-    if found is None:
-        coarse = _once(system, X0, y0, times, *_local(rtol, atol, share), where)
-        X, y, steps = coarse.X[1:], coarse.y[1:], coarse.steps
+        found = _twice(system, X0, y0, times, rtol, atol, share, free)
+    coarse = _once(system, X0, y0, times, *_local(rtol, atol, share), where) if found is None else None
     shorter = 1.0
     for _ in range(_MOST_RUNS):
         share /= _RATIO
         local = _local(rtol, atol, share)
         if free:  # where the reach limits steps two runs would be the same
             shorter *= _SHORTER
-        if found is None:
-            fine = _once(system.within(shorter), X0, y0, times, *local, where)
-            with np.errstate(invalid="ignore"):
-                difference = max(_size(fine.X[1:] - X), _size(fine.y[1:] - y))
-            size = max(_size(fine.X), _size(fine.y))
-        else:
+        if found is not None:
             fine, difference, size, steps = found
             found = None
+        elif coarse is not None:
+            fine, steps = _once(system.within(shorter), X0, y0, times, *local, where), coarse.steps
+            difference, size = _difference(system, fine, coarse, times, free), max(_size(fine.X), _size(fine.y))
         scale = max(1.0, size)
         # errors go as the eighth power of the steps: where these hardly became shorter, the tolerances promise too much
         ratio = min(_RATIO, max((fine.steps / steps) ** 8, 2.0)) if free else _RATIO
-        estimate = 2 * difference / (ratio - 1)
+        estimate = 2 * difference / (ratio - 1) + fine.left
         # Rounding: no run of so many steps knows its states better.
         floor = 1e-15 * scale * sqrt(fine.steps / len(X0))
         goal = max(rtol * scale, atol, floor)
@@ -186,11 +202,22 @@ def _to_tolerance(
         if needed > _RATIO**2:  # far off: the next pair starts there
             share /= min(needed / _RATIO, 1e4)
             fine = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where)
-        X, y, steps = fine.X[1:], fine.y[1:], fine.steps
+        coarse = fine
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
     )
+
+
+def _difference(system: System, fine: PairRun, coarse: PairRun, times: Array, free: bool) -> float:
+    """How far two runs are apart: at the times that are wanted; or, where states between steps are known and these are fewer, where the
+    steps of the first end, at which it is as good as it gets."""
+    X, y, X_other, y_other = fine.X[1:], fine.y[1:], coarse.X[1:], coarse.y[1:]
+    if free and coarse.steps < len(times) - 1:
+        X, y = fine.at(system, np.append(coarse.knot_t[1:], times[-1]))
+        X_other, y_other = coarse.within(system, np.arange(coarse.steps), np.ones(coarse.steps))
+    with np.errstate(invalid="ignore"):
+        return max(_size(X - X_other), _size(y - y_other))
 
 
 def _local(rtol: float, atol: float, share: float) -> tuple[float, float]:
@@ -232,7 +259,7 @@ def _many(
         return sum(run.steps for run in runs), sum(run.rejected for run in runs), sum(run.evaluations for run in runs)
 
     steps, rejected, evaluations = np.sum(share_out(part, len(X0), threads, _BLOCK), axis=0).tolist()
-    return PairRun(X_out, y_out, steps, rejected, evaluations, nan, *_no_knots(system))
+    return PairRun(X_out, y_out, steps, rejected, evaluations, nan, 0.0, np.empty((0, 2 + system.kept + system.size)))
 
 
 def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str) -> PairRun:
@@ -276,66 +303,97 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
         room = _STEPS
     refuse(status, given.t, atol, _MOST_STEPS, where)
     kept = knots[0] if len(knots) == 1 else tuple(np.concatenate(each) for each in zip(*knots, strict=True))
+    left = 0.0
     if between:
         given.times, given.count, given.X_out, given.y_out = wanted
         given.knot_t, given.knot_h, given.knot_X, given.knot_y, given.knot_slope, given.knot_theta = (
             each.ctypes.data for each in kept
         )
-        library.pair_between(ctypes.addressof(given), given.steps, _between(system))
+        left = library.pair_between(ctypes.addressof(given), given.steps, _between(system))
         kept = tuple(each[:-1] for each in kept[:4])
-    return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, nan, *kept)
+    return PairRun(X_out, y_out, given.steps, given.rejected, given.evaluations, nan, left, np.column_stack(kept))
 
 
 def _twice(
-    system: System, X0: Array, y0: Array, times: Array, tolerances: tuple[float, float, float, float, float]
+    system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, share: float, free: bool
 ) -> tuple[PairRun, float, float, int] | None:
-    """One member at two tolerances (relative and absolute local errors of one, of the other; the factor of the reach of the other), in one call.
+    """One member at two tolerances, that share of what is asked for and less, in one call; `free` as in `_to_tolerance`.
 
     Returns:
         The second run, its largest difference to the first, its size, the steps of the first; None where one of them needs more
         than the first room for knots and one to each time at which steps end, or fails: `_once` says how.
     """
-    between = system.is_interpolated and len(times) > 2
-    room = _FIRST_STEPS + (0 if between else len(times))
-    if room > _STEPS:
+    steps = _FIRST_STEPS + (0 if free else len(times))
+    if steps > _STEPS:
         return None
-    packed, size, kept, k = system.packed, system.size, system.kept, len(times)
-    state, rows = packed + size, room + 1
-    given = system.record()
-    # behind each other: the start, tolerances, found, times, the states of the run with longer steps; then of each of the two runs where it is,
-    # what steps and interpolation work with, knots by columns
-    common = (state, 5, 5, k - 1, (k - 1) * state)
-    own = (
-        system.work_size, packed, size, system.between_size if between else 0, rows, rows, rows * kept, rows * size,
-        *((rows * size, rows * system.turns) if between else ()),
-    )  # fmt: skip
-    places = [0, *accumulate((*common, *own))]
-    apart = -(-sum(own) // _LINE) * _LINE
-    block, X, y = np.empty(places[5] + 2 * apart + _LINE), np.empty((k, 1, packed)), np.empty((k, 1, size))
-    at = block.ctypes.data
-    lead = -(at // 8 + places[5]) % _LINE  # slopes of a stage begin with a line of memory
-    block, at = block[lead:], at + 8 * lead
-    block[:packed], block[packed:state], block[state : state + 5] = X0[0], y0[0], tolerances
-    block[places[3] : places[4]] = times[1:]
-    X[0], y[0] = X0, y0
-    start, asked, found, given.times, other, given.work, given.X, given.y, given.dense, *knots = [
-        at + 8 * place for place in places[:-1]
-    ]
-    given.knot_t, given.knot_h, given.knot_X, given.knot_y = knots[:4]
-    if between:
-        given.knot_slope, given.knot_theta = knots[4:]
-    given.t, given.longest, given.count = times[0], times[-1] - times[0], k - 1
-    given.room = room
-    given.X_out, given.y_out = X.ctypes.data + 8 * packed, y.ctypes.data + 8 * size
-    status = compiled_pair().pair_twice(
-        ctypes.addressof(given), start, asked, room, _between(system), apart, other, found
-    )
-    if status != DONE:
-        return None
-    off_X, off_y, size_X, size_y, coarse = block[places[2] : places[3]].tolist()
-    knots_kept = _rows(block[places[9] :], rows, given.steps, (1, 1, kept, size))
-    run = PairRun(X, y, given.steps, given.rejected, given.evaluations, nan, *knots_kept)
-    return run, max(off_X, off_y), max(size_X, size_y), int(coarse)
+    try:
+        room = system.idle.pop()  # pop and append are atomic: nobody else uses it
+    except IndexError:
+        room = _Room(system, len(times), steps, free)
+    if room.shape != (len(times), steps):
+        room = _Room(system, len(times), steps, free)
+    found = room.run(X0, y0, times, (rtol, atol, share))
+    if room.shape[0] <= _MOST_TIMES_KEPT:
+        system.idle.append(room)
+    return found
+
+
+class _Room:
+    """What both runs of a single member read and write, kept by its system for the next call: compiled code changes nothing else.
+
+    Args:
+        system: what is integrated.
+        times: how many.
+        steps: for which there is room.
+        free: whether states between steps are interpolated.
+    """
+
+    def __init__(self, system: System, times: int, steps: int, free: bool) -> None:
+        packed, size, kept, k, rows = system.packed, system.size, system.kept, times, steps + 1
+        state, width = packed + size, 2 + kept + size
+        # behind each other: the start, what is found, times, states of the run that is given and of the other, knots row by row; then of each of
+        # the two runs where it is, what steps and interpolation work with, knots by columns
+        common = (packed, size, 7, k, k * packed, k * size, (k - 1) * (state + packed), rows * width)
+        own = (
+            system.work_size, packed, size, system.between_size if free else 0, rows, rows, rows * kept, rows * size,
+            *((rows * size, rows * system.turns) if free else ()),
+        )  # fmt: skip
+        places = [0, *accumulate((*common, *own))]
+        first = len(common)
+        apart = -(-sum(own) // _LINE) * _LINE
+        block = np.zeros(places[first] + 2 * apart + _LINE)
+        lead = -(block.ctypes.data // 8 + places[first]) % _LINE  # slopes of a stage begin with a line of memory
+        block = block[lead:]
+        parts = [block[a:b] for a, b in pairwise(places[: first + 1])]
+        self.shape, self._goal = (k, steps), (0.0, 0.0, 0.0)
+        self._X0, self._y0, self._found, self._times, X, y, _, self._knots = parts
+        self._X, self._y, self._width = X.reshape(k, 1, packed), y.reshape(k, 1, size), width
+        self._pair, self._both, at = system.record(), Twice(), [block.ctypes.data + 8 * place for place in places]
+        pair, both = self._pair, self._both
+        both.start, _, both.found, pair.times, pair.X_out, pair.y_out, both.other, both.knots = at[:first]
+        pair.work, pair.X, pair.y, pair.dense, pair.knot_t, pair.knot_h, pair.knot_X, pair.knot_y = at[first : first + 8]
+        if free:
+            pair.knot_slope, pair.knot_theta = at[first + 8 : first + 10]
+        pair.count, pair.room = k, steps
+        both.pair, both.apart, both.most = ctypes.addressof(pair), apart, _between(system)
+        both.shorter = _SHORTER if free else 1.0
+        self._call, self._address = compiled_pair().pair_twice, ctypes.addressof(both)
+
+    def run(
+        self, X0: Array, y0: Array, times: Array, goal: tuple[float, float, float]
+    ) -> tuple[PairRun, float, float, int] | None:
+        """Both runs from one state; arguments and result as of `_twice`."""
+        self._X0[:], self._y0[:], self._times[:] = X0[0], y0[0], times
+        if goal != self._goal:
+            rtol, atol, share = self._goal = goal
+            self._both.tolerance[:] = *_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO)
+        if self._call(self._address) != DONE:
+            return None
+        off, largest, coarse, counted, rejected, evaluations, left = self._found.tolist()
+        steps = int(counted)
+        knots = self._knots[: steps * self._width].reshape(steps, self._width).copy()
+        run = PairRun(self._X.copy(), self._y.copy(), steps, int(rejected), int(evaluations), nan, left, knots)
+        return run, off, largest, int(coarse)
 
 
 def _between(system: System) -> float:
@@ -350,7 +408,3 @@ def _rows(rows: Array, room: int, count: int, widths: tuple[int, ...]) -> tuple[
         found.append(part.reshape(count, width) if k > 1 else part)
         place += room * width
     return tuple(found)
-
-
-def _no_knots(system: System) -> tuple[Array, Array, Array, Array]:
-    return np.empty(0), np.empty(0), np.empty((0, system.kept)), np.empty((0, system.size))

@@ -53,6 +53,16 @@ class Pair(ctypes.Structure):
     ]  # fmt: skip
 
 
+class Twice(ctypes.Structure):
+    """`Twice` of templates/pair853.c."""
+
+    _fields_ = [
+        ("pair", ctypes.c_void_p), ("start", ctypes.c_void_p), ("tolerance", ctypes.c_double * 4),
+        ("shorter", ctypes.c_double), ("most", ctypes.c_double), ("apart", ctypes.c_ssize_t),
+        *((n, ctypes.c_void_p) for n in ("other", "knots", "found")),
+    ]  # fmt: skip
+
+
 @lru_cache(maxsize=1)
 def pair_library() -> Any:
     """pair853.c, loaded; None where there is no compiler."""
@@ -74,12 +84,12 @@ def pair_library() -> Any:
     library, size, pointer = load_library(path), ctypes.c_ssize_t, ctypes.c_void_p
     library.pair_run.restype, library.pair_run.argtypes = size, (pointer, size)
     library.gauss_run.restype, library.gauss_run.argtypes = size, (pointer, size, size)
-    library.pair_twice.restype, library.pair_twice.argtypes = (
-        size,
-        (pointer, pointer, pointer, size, ctypes.c_double, size, pointer, pointer),
-    )
+    library.pair_twice.restype, library.pair_twice.argtypes = size, (pointer,)
     library.between_size.restype, library.between_size.argtypes = size, (size, size)
-    library.pair_between.restype, library.pair_between.argtypes = None, (pointer, size, ctypes.c_double)
+    library.pair_between.restype, library.pair_between.argtypes = (
+        ctypes.c_double,
+        (pointer, size, ctypes.c_double),
+    )
     library.pair_lift.restype, library.pair_lift.argtypes = None, (pointer,)
     library.pair_within.restype, library.pair_within.argtypes = (
         None,

@@ -112,6 +112,11 @@ class System:
         return np.empty(self.work_size)
 
     @cached_property
+    def idle(self) -> list[Any]:
+        """Memory of runs that are over, for the next ones."""
+        return []
+
+    @cached_property
     def _one(self) -> tuple[int, int]:
         """Where rate and move of one member are."""
         return self.rate.backend.address(many=False), self.move.backend.address(many=False)
