@@ -6,7 +6,7 @@ import reprlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,9 @@ _FEW = 4
 #: Classes of values that are keys by themselves, and bytes of the largest array that is part of one.
 _ATOMS, _LARGEST = frozenset({bool, int, str}), 2**15
 _ENTRIES = 6
+
+
+Record = TypeVar("Record")
 
 
 class Value:
@@ -66,6 +69,14 @@ def settle(record: Any, **kept: Any) -> None:
     """
     for name, value in kept.items():
         object.__setattr__(record, name, value)
+
+
+def made_of(kind: type[Record], **kept: Any) -> Record:
+    """A frozen record of all its fields, each in the form in which it is kept, and of what stands beside them: what its constructor makes, in a
+    third of the time, which counts where a whole call takes some ten microseconds."""
+    record = object.__new__(kind)
+    vars(record).update(kept)
+    return record
 
 
 @dataclass(eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from lie_codegen.control.loop_states import own_states
 from lie_codegen.flow.events import EventHits
 from lie_codegen.flow.pair853 import PairRun
 from lie_codegen.kernel.kernel import Port
-from lie_codegen.values import Later
+from lie_codegen.values import Later, made_of
 
 
 def result_of(
@@ -37,40 +38,55 @@ def result_of(
         events: what was found along it.
     """
     loop, times = run.loop, run.times
-
     pair = found if isinstance(found, PairRun) else None
-
-    def course() -> Array:
-        return states_of(run, found) if isinstance(found, PairRun) else found
-
-    X, xi = loop.plant.split(course()) if pair is None else motion_of(run, pair)
-    states = own_states(loop, course(), sampled=bool(run.sample)) if loop.own_ports else {}
+    X, xi = loop.plant.split(found) if isinstance(found, np.ndarray) else motion_of(run, found)
     moves = run.reference(times)
-    made: list[tuple[dict[str, Array], Array | None]] = []
-
-    def said() -> tuple[dict[str, Array], Array | None]:
-        # what nobody asks for is not computed; who asks for one of the two gets both
-        if not made:
-            whole = course()
-            outputs, u = _outputs(run, whole, moves)
-            if run.sample and loop.law is not None:
-                u = np.ascontiguousarray(whole[..., -loop.plant.sizes[2] :])
-            made.append(({**outputs, **{name: value for name, value in states.items() if name not in outputs}}, u))
-        return made[0]
-
-    if loop.plant.order == 1 and loop.law is not None:
-        u = said()[1]
-        xi = xi if u is None else u
-    gap = run.sample or float(times[1] - times[0])
-    steps = pair.steps if pair is not None else count * round((times[-1] - times[0]) / gap)
-    group = getattr(loop.plant, "group", None)
+    steps = count * round((times[-1] - times[0]) / (run.sample or float(times[1] - times[0]))) if pair is None else pair.steps
     making = LoopMaking(run, told.model, told.reference, told.rtol, count, pair)
+    said = _Said(run, found, moves)
+    if loop.plant.order == 1 and loop.law is not None:
+        u = said.both[1]
+        xi = xi if u is None else u
     kind = told.kind if pair is None else "adaptive"
-    later: Any = (Later(lambda: said()[0]), Later(lambda: said()[1]), Later(lambda: loop_origin(making, kind)))
-    outputs, u_later, origin = later
-    return ClosedLoop(
-        times, X, xi, outputs, moves.get("X_d"), moves.get("xi_d"), steps, error, u_later, states, group, events, origin
-    )._made_by(making)
+    return made_of(
+        ClosedLoop, t=times, X=X, xi=xi, outputs=Later(said.outputs), X_d=moves.get("X_d"), xi_d=moves.get("xi_d"), steps=steps,
+        error_estimate=error, u=Later(said.command), states=said.states if loop.own_ports else {},
+        group=getattr(loop.plant, "group", None), events=events, origin=Later(partial(loop_origin, making, kind)), _made=making,
+    )  # fmt: skip
+
+
+class _Said:
+    """What the law says along a run: what nobody asks for is not computed, and who asks for one part gets all."""
+
+    def __init__(self, run: Run, found: Array | PairRun, moves: dict[str, Array]) -> None:
+        self._run, self._found, self._moves = run, found, moves
+
+    @cached_property
+    def course(self) -> Array:
+        """The states."""
+        return states_of(self._run, self._found) if isinstance(self._found, PairRun) else self._found
+
+    @cached_property
+    def states(self) -> dict[str, Array]:
+        """The own states of the law by name."""
+        return own_states(self._run.loop, self.course, sampled=bool(self._run.sample))
+
+    @cached_property
+    def both(self) -> tuple[dict[str, Array], Array | None]:
+        """Outputs, own states among them, and the command."""
+        run, loop = self._run, self._run.loop
+        outputs, u = _outputs(run, self.course, self._moves)
+        if run.sample and loop.law is not None:
+            u = np.ascontiguousarray(self.course[..., -loop.plant.sizes[2] :])
+        return {**outputs, **{name: value for name, value in self.states.items() if name not in outputs}}, u
+
+    def outputs(self) -> dict[str, Array]:
+        """The outputs."""
+        return self.both[0]
+
+    def command(self) -> Array | None:
+        """The command."""
+        return self.both[1]
 
 
 def _outputs(run: Run, found: Array, moves: dict[str, Array]) -> tuple[dict[str, Array], Array | None]:

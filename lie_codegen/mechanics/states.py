@@ -21,12 +21,15 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
         ShapeError: X0 or xi0 has another shape.
         NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
     """
-    d, n, identity = group.degree, group.dim, identity_of(group)
+    n, identity = group.dim, identity_of(group)
+    d = len(identity)
     X = identity if X0 is None else np.asarray(X0, dtype=identity.dtype)
     xi = np.zeros(n) if xi0 is None else np.asarray(xi0, dtype=float)
     if X.shape == (d, d) and xi.shape == (n,):
-        start = X if X is identity else admitted(group, X, "X0").X
-        return np.concatenate((packed_elements(group, start), xi))[None], False
+        packed = packed_elements(group, X if X is identity else admitted(group, X, "X0").X)
+        state = np.empty((1, len(packed) + n))
+        state[0, : len(packed)], state[0, len(packed) :] = packed, xi
+        return state, False
     if X.shape[-2:] != (d, d) or X.ndim not in (2, 3) or xi.shape[-1:] != (n,) or xi.ndim not in (1, 2):
         raise ShapeError(
             f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},), or N of either: (N, {d}, {d}), (N, {n})"

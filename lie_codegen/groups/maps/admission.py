@@ -80,15 +80,14 @@ def admitted_all(group: MatrixGroup, X: Array, where: str) -> tuple[Array, Array
 
 
 def _matrix(group: MatrixGroup, X: ArrayLike, where: str) -> Array:
-    d = group.degree
+    d, dtype = group.degree, group.basis.dtype
     try:
         given = np.asarray(X)
-        real = not group.is_complex
-        if real and given.dtype.kind == "c":
+        if given.dtype.kind == "c" and dtype.kind != "c":
             if np.any(given.imag != 0):
                 raise ShapeError(f"{where}: complex entries, but {group.name} is a group of real matrices")
             given = given.real
-        matrix = np.ascontiguousarray(given, dtype=group.basis.dtype)
+        matrix = np.ascontiguousarray(given, dtype=dtype)
     except (TypeError, ValueError) as error:
         if isinstance(error, ShapeError):
             raise

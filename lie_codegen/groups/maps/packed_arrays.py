@@ -48,7 +48,7 @@ def packed_elements(group: MatrixGroup, X: Array) -> Array:
     entries = np.ascontiguousarray(X, dtype=form.dtype).reshape(*X.shape[:-2], -1)
     if form.places is not None:
         entries = entries.take(form.places, axis=-1)
-    return entries.view(float)
+    return entries if entries.dtype.kind == "f" else entries.view(float)
 
 
 def elements_of(group: MatrixGroup, packed: Array) -> Array:
@@ -56,7 +56,8 @@ def elements_of(group: MatrixGroup, packed: Array) -> Array:
     form = _form(group)
     shape = (*packed.shape[:-1], *form.identity.shape)
     if form.places is None:  # row by row, as they stand in the matrix
-        return copied(packed).view(form.dtype).reshape(shape)
+        entries = copied(packed)
+        return (entries if form.dtype.kind == "f" else entries.view(form.dtype)).reshape(shape)
     X = empty(shape, form.dtype)
     X[...] = form.identity
     flat = X.reshape(*packed.shape[:-1], -1)
