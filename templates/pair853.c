@@ -19,6 +19,7 @@
 #include "pair_control.h"
 #include "pair_hermite.h"
 #include "pair_step.h"
+#include "pair_two.h"
 
 typedef void (*Call)(const double *const *in, double *const *out);
 
@@ -38,6 +39,7 @@ typedef struct {
     ptrdiff_t steps, rejected, evaluations;
     Brackets brackets;              /* of pair_between, as what follows: of the algebra, if xi are the entries of y behind Theta */
     double *dense;                  /* room for `between_size` */
+    Both both;                      /* the steps of two runs at once; NULL if there is none for this rate */
 } Pair;
 
 /* The parts of `work`. */
@@ -163,23 +165,27 @@ static APART void advance(Pair *p, const double *X, const double *y, double t, d
     pair_step(slope_of, &within, wide(p), t, y, h, k, stage, after);
 }
 
-/*
- * The error of a step over what is allowed. Negative where |Theta| goes beyond its reach; NaN shows.
- */
-static double judged(const Pair *p, const double *y, const double *after, double h, const double *k)
+/* What the estimates of a step from y to `after` say of its error, from the slopes k. */
+static APART Errors errors_of(const Pair *p, const double *y, const double *after, const double *k)
 {
     const Room room = room_of(p);
-    double five = 0.0, three = 0.0, angle = 0.0, error;
+    Errors found = {0.0, 0.0, 0.0};
     pair_errors(k, wide(p), room.more, room.last);
     for (ptrdiff_t i = 0; i < p->size; ++i) {
         const double a = fabs(y[i]), b = fabs(after[i]), size = size_of(p, i, a > b ? a : b);
         const double units = 1.0 / (p->atol + p->rtol * size), e5 = units * room.more[i], e3 = units * room.last[i];
-        five += e5 * e5;
-        three += e3 * e3;
-        angle += i < p->group ? after[i] * after[i] : 0.0;
+        found.five += e5 * e5;
+        found.three += e3 * e3;
+        found.angle += i < p->group ? after[i] * after[i] : 0.0;
     }
-    error = pair_error(five, three, h, p->size);
-    return error <= 1e300 && angle > p->reach * p->reach ? -sqrt(angle) / p->reach : error;
+    return found;
+}
+
+/* The error of a step over what is allowed. Negative where |Theta| goes beyond its reach; NaN shows. */
+static double judged(const Pair *p, const Errors *found, double h)
+{
+    const double error = pair_error(found->five, found->three, h, p->size);
+    return error <= 1e300 && found->angle > p->reach * p->reach ? -sqrt(found->angle) / p->reach : error;
 }
 
 static void keep(Pair *p, const double *X, const double *y)
@@ -206,6 +212,7 @@ static void mark(Pair *p, double h, const double *slope, const double *theta)
 /* Where a run is: the step that is tried next, of length h, where `wish` could be and the next wanted time is `gap` away. */
 typedef struct {
     double gap, wish, h;
+    Errors found; /* of the step that was tried */
     ptrdiff_t taken;
     int ends, fresh; /* whether the step ends at a wanted time; whether its first slope is still to be had */
 } Course;
@@ -250,18 +257,41 @@ static APART ptrdiff_t propose(Pair *p, Course *c, ptrdiff_t most_steps)
     } else if (gap < 1.9 * c->h) {
         c->h = 0.5 * gap; /* not a step and a crumb */
     }
+    return GO;
+}
+
+/* The step that is tried, as one of two over lanes. */
+static Half half_of(Pair *p, Course *c)
+{
+    const Room room = room_of(p);
+    const Half half = {p->X, p->y, p->t, c->h, p->rtol, p->atol, room.k, room.after, &c->found};
+    p->evaluations += c->fresh ? STAGES : STAGES - 1;
+    c->fresh = 0;
+    return half;
+}
+
+/* The stages of the step that is tried, the state after it and what is known of its error. */
+static APART void attempt(Pair *p, Course *c)
+{
+    const Room room = room_of(p);
+    if (p->both) {
+        const Half half = half_of(p, c), of[2] = {half, half};
+        p->both(of, p->number);
+        return;
+    }
     if (c->fresh) { /* the last slope of the step before is of no use: it was at Theta, and now X holds exp(Theta) and Theta is zero */
         rates(p, p->X, p->y, p->t, room.k);
         c->fresh = 0;
     }
-    return GO;
+    advance(p, p->X, p->y, p->t, c->h, room.k, room.stage, room.after);
+    c->found = errors_of(p, p->y, room.after, room.k);
 }
 
 /* The stages of the step are there: it is taken, or another is to be tried (GO); why there can be no other. */
 static APART ptrdiff_t conclude(Pair *p, Course *c)
 {
     const Room room = room_of(p);
-    const double error = judged(p, p->y, room.after, c->h, room.k);
+    const double error = judged(p, &c->found, c->h);
     if (!(error <= 1.0) || error < 0.0) {
         ++p->rejected;
         /* Theta grows about as h does: the first length ends at 0.9 of its reach */
@@ -301,12 +331,11 @@ static APART ptrdiff_t conclude(Pair *p, Course *c)
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps);
 EXPORT ptrdiff_t pair_run(Pair *p, ptrdiff_t most_steps)
 {
-    const Room room = room_of(p);
     Course c;
     ptrdiff_t status;
     begin(p, &c);
     while ((status = propose(p, &c, most_steps)) == GO) {
-        advance(p, p->X, p->y, p->t, c.h, room.k, room.stage, room.after);
+        attempt(p, &c);
         if ((status = conclude(p, &c)) != GO) {
             break;
         }
@@ -408,11 +437,18 @@ static APART void prepare_between(const Pair *p, ptrdiff_t steps, ptrdiff_t s, B
     }
 }
 
+/* States that are wanted at so many times. */
+typedef struct {
+    ptrdiff_t count;
+    const double *times;
+    double *X, *y;
+} Asked;
+
 /*
- * States at so many times within the `steps` steps of a run that is done. What is left away with the last terms of an interpolant errs
- * more than it does; where that is more than `most` times what a step may err, a step of its own goes there. Returns the largest of what was left.
+ * States at times within the `steps` steps of a run that is done. What is left away with the last terms of an interpolant errs
+ * more than it does; where that is more than `most` times what a step may err, a step of its own goes there. Two rows of times go together, so that a polynomial is made once. Returns the largest of what was left.
  */
-static double states_at(Pair *p, ptrdiff_t steps, double most, ptrdiff_t count, const double *times, double *X_out, double *y_out)
+static double states_at(Pair *p, ptrdiff_t steps, double most, Asked one, Asked two)
 {
     const Room room = room_of(p);
     const ptrdiff_t n = p->group, rest = p->size - n;
@@ -427,9 +463,14 @@ static double states_at(Pair *p, ptrdiff_t steps, double most, ptrdiff_t count, 
     theta = b.spare + 9 * n + turn_room(n);
     last = theta + fours(n);
     memset(room.k, 0, (size_t)(wide(p) * STAGES) * sizeof(double));
-    for (ptrdiff_t w = 0; w < count; ++w, X_out += p->packed, y_out += p->size) {
-        const double t = times[w];
-        double part;
+    while (one.count || two.count) {
+        Asked *next = one.count && !(two.count && *two.times < *one.times) ? &one : &two;
+        const double t = *next->times;
+        double *X_out = next->X, *y_out = next->y, part;
+        --next->count;
+        ++next->times;
+        next->X += p->packed;
+        next->y += p->size;
         while (s + 1 < steps && p->knot_t[s + 1] <= t) {
             ++s;
         }
@@ -475,7 +516,8 @@ static double states_at(Pair *p, ptrdiff_t steps, double most, ptrdiff_t count, 
 EXPORT double pair_between(Pair *p, ptrdiff_t steps, double most);
 EXPORT double pair_between(Pair *p, ptrdiff_t steps, double most)
 {
-    return states_at(p, steps, most, p->count, p->times, p->X_out, p->y_out);
+    const Asked all = {p->count, p->times, p->X_out, p->y_out}, none = {0, NULL, NULL, NULL};
+    return states_at(p, steps, most, all, none);
 }
 
 /* From the start, X then y, at this tolerance; where states between steps are interpolated to the last time, which alone is wanted on the way. */
@@ -521,18 +563,32 @@ static APART double farthest(ptrdiff_t n, const double *a, const double *b, doub
     return least;
 }
 
-/* The stages of a step of each of two runs of one system, in turn: neither waits for the other, and a processor has both under way. */
-static void advance_both(Pair *const *p, const Course *c)
+/* The same for each of two runs of one system: over lanes; or in turn, for neither waits for the other, and a processor has both under way. */
+static void attempt_both(Pair *p, Course *c)
 {
-    const ptrdiff_t n = wide(p[0]);
+    const ptrdiff_t n = wide(p);
+    const Room room[2] = {room_of(p), room_of(p + 1)};
+    if (p->both) {
+        const Half of[2] = {half_of(p, c), half_of(p + 1, c + 1)};
+        p->both(of, p->number);
+        return;
+    }
+    for (int r = 0; r < 2; ++r) {
+        if (c[r].fresh) {
+            rates(p + r, p[r].X, p[r].y, p[r].t, room[r].k);
+            c[r].fresh = 0;
+        }
+    }
     for (int s = 1; s <= STAGES; ++s) {
         for (int r = 0; r < 2; ++r) {
-            const Room room = room_of(p[r]);
-            pair_stage(s, n, p[r]->y, c[r].h, room.k, s < STAGES ? room.stage : room.after);
+            pair_stage(s, n, p[r].y, c[r].h, room[r].k, s < STAGES ? room[r].stage : room[r].after);
             if (s < STAGES) {
-                rates(p[r], p[r]->X, room.stage, p[r]->t + C[s] * c[r].h, room.k + s * n);
+                rates(p + r, p[r].X, room[r].stage, p[r].t + C[s] * c[r].h, room[r].k + s * n);
             }
         }
+    }
+    for (int r = 0; r < 2; ++r) {
+        c[r].found = errors_of(p + r, p[r].y, room[r].after, room[r].k);
     }
 }
 
@@ -564,7 +620,7 @@ typedef struct {
 
 /*
  * How far the states of two runs are apart: at the times that are wanted; or, where states between steps are known and these are fewer, where the
- * steps of the first end, at which it is as good as it gets.
+ * steps of the first end, at which it is as good as it gets. Where they are known those of the second come from here.
  */
 static double difference(const Twice *w, const Pair *fine, Pair *runs)
 {
@@ -572,18 +628,23 @@ static double difference(const Twice *w, const Pair *fine, Pair *runs)
     ptrdiff_t count = fine->count;
     double *X = w->other, *y = X + count * elements, *X_ends = y + count * vectors;
     const double *X_fine = fine->X_out, *y_fine = fine->y_out;
-    if (fine->knot_slope && runs[0].steps < count) {
-        count = runs[0].steps;
-        states_at(runs + 1, runs[1].steps, w->most, count, runs[0].knot_t + 1, X, y);
-        X_fine = X;
-        y_fine = y;
-        y = runs[0].knot_y + vectors;
-        for (ptrdiff_t k = 0; k < count; ++k) {
-            express(runs, runs[0].knot_X + (k + 1) * kept(runs), y + k * vectors, X_ends + k * elements);
+    if (fine->knot_slope) {
+        const int few = runs[0].steps < count;
+        const Asked wanted = {count, fine->times, fine->X_out, fine->y_out}, ends = {few ? runs[0].steps : 0, runs[0].knot_t + 1, X, y};
+        w->found[6] = states_at(runs + 1, runs[1].steps, w->most, wanted, ends);
+        if (few) {
+            count = runs[0].steps;
+            X_fine = X;
+            y_fine = y;
+            X = X_ends;
+            y = runs[0].knot_y + vectors;
+            for (ptrdiff_t k = 0; k < count; ++k) {
+                express(runs, runs[0].knot_X + (k + 1) * kept(runs), y + k * vectors, X + k * elements);
+            }
+        } else {
+            const Asked same = {count, fine->times, X, y}, none = {0, NULL, NULL, NULL};
+            states_at(runs, runs[0].steps, w->most, same, none);
         }
-        X = X_ends;
-    } else if (fine->knot_slope) {
-        states_at(runs, runs[0].steps, w->most, count, fine->times, X, y);
     }
     return farthest(count * elements, X_fine, X, farthest(count * vectors, y_fine, y, 0.0));
 }
@@ -591,7 +652,7 @@ static double difference(const Twice *w, const Pair *fine, Pair *runs)
 EXPORT ptrdiff_t pair_twice(const Twice *w);
 EXPORT ptrdiff_t pair_twice(const Twice *w)
 {
-    Pair fine = *w->pair, coarse, runs[2], *both[2] = {runs, runs + 1};
+    Pair fine = *w->pair, coarse, runs[2];
     Course course[2];
     ptrdiff_t status[2];
     double **const parts[] = {&coarse.X, &coarse.y, &coarse.work, &coarse.dense, &coarse.knot_t, &coarse.knot_h, &coarse.knot_X, &coarse.knot_y, &coarse.knot_slope, &coarse.knot_theta};
@@ -613,20 +674,18 @@ EXPORT ptrdiff_t pair_twice(const Twice *w)
     runs[1] = from_start(&fine, w->start, w->tolerance + 2);
     runs[1].reach *= w->shorter;
     for (int r = 0; r < 2; ++r) {
-        begin(both[r], course + r);
-        status[r] = propose(both[r], course + r, fine.room);
+        begin(runs + r, course + r);
+        status[r] = propose(runs + r, course + r, fine.room);
     }
     while (status[0] == GO || status[1] == GO) {
         if (status[0] == GO && status[1] == GO) {
-            advance_both(both, course);
+            attempt_both(runs, course);
         } else {
-            const Pair *one = both[status[1] == GO];
-            const Room room = room_of(one);
-            advance(both[status[1] == GO], one->X, one->y, one->t, course[status[1] == GO].h, room.k, room.stage, room.after);
+            attempt(runs + (status[1] == GO), course + (status[1] == GO));
         }
         for (int r = 0; r < 2; ++r) {
-            if (status[r] == GO && (status[r] = conclude(both[r], course + r)) == GO) {
-                status[r] = propose(both[r], course + r, fine.room);
+            if (status[r] == GO && (status[r] = conclude(runs + r, course + r)) == GO) {
+                status[r] = propose(runs + r, course + r, fine.room);
             }
         }
     }
@@ -637,7 +696,7 @@ EXPORT ptrdiff_t pair_twice(const Twice *w)
         runs[r].times = fine.times;
         runs[r].count = fine.count;
     }
-    w->found[6] = fine.knot_slope ? states_at(runs + 1, runs[1].steps, w->most, fine.count, fine.times, fine.X_out, fine.y_out) : 0.0;
+    w->found[6] = 0.0;
     w->found[0] = difference(w, &fine, runs);
     w->found[1] = farthest(fine.count * fine.packed, fine.X_out, NULL, farthest(fine.count * fine.size, fine.y_out, NULL, 0.0));
     w->found[2] = (double)runs[0].steps;

@@ -190,8 +190,8 @@ static APART void hermite(const Hermite *p, ptrdiff_t n, double h)
 {
     double over[KNOTS][KNOTS];
     ptrdiff_t i = 0;
-    for (int k = 1; k < KNOTS; ++k) {
-        for (int j = 0; j < k; ++j) {
+    for (int k = 0; k < KNOTS; ++k) { /* all, the zeros between too: so they are divided several at once */
+        for (int j = 0; j < KNOTS; ++j) {
             over[k][j] = 1.0 / (p->place[k] - p->place[j]);
         }
     }

@@ -274,7 +274,7 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
     state = packed + size
     work = state + k - 1
     dense = work + system.work_size
-    block = np.empty(dense + system.between_size if between else dense)
+    block = np.zeros(dense + system.between_size if between else dense)  # the padding behind a state is read
     block[:packed], block[packed:state], block[state:work] = X0[0], y0[0], times[1:]
     at = block.ctypes.data
     given.t, given.h, given.rtol, given.atol = float(times[0]), 0.0, rtol, atol
@@ -374,7 +374,7 @@ class _Room:
         pair.work, pair.X, pair.y, pair.dense, pair.knot_t, pair.knot_h, pair.knot_X, pair.knot_y = at[first : first + 8]
         if free:
             pair.knot_slope, pair.knot_theta = at[first + 8 : first + 10]
-        pair.count, pair.room = k, steps
+        pair.count, pair.room, pair.both = k, steps, system.both
         both.pair, both.apart, both.most = ctypes.addressof(pair), apart, _between(system)
         both.shorter = _SHORTER if free else 1.0
         self._call, self._address = compiled_pair().pair_twice, ctypes.addressof(both)

@@ -49,7 +49,7 @@ class Pair(ctypes.Structure):
         *((n, ctypes.c_void_p) for n in ("X_out", "y_out", "knot_t", "knot_h", "knot_X", "knot_y", "knot_slope", "knot_theta")),
         *((n, ctypes.c_ssize_t) for n in ("room", "knots")), ("work", ctypes.c_void_p),
         *((n, ctypes.c_ssize_t) for n in ("steps", "rejected", "evaluations", "algebra", "brackets")),
-        *((n, ctypes.c_void_p) for n in ("bracket_index", "bracket_c", "dense")),
+        *((n, ctypes.c_void_p) for n in ("bracket_index", "bracket_c", "dense", "both")),
     ]  # fmt: skip
 
 
@@ -72,7 +72,7 @@ def pair_library() -> Any:
         return {
             "pair853.c": text,
             **group_headers(),
-            "pair_hermite.h": (template_folder() / "pair_hermite.h").read_text(encoding="utf-8"),
+            **{name: (template_folder() / name).read_text(encoding="utf-8") for name in ("pair_hermite.h", "pair_two.h")},
         }
 
     try:

@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.flow.pair_library import STAGES, Pair, compiled_pair, pair_library
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.runtime.call import Compiled
+from lie_codegen.runtime.pair_headers import two_files
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +130,22 @@ class System:
         From elements to X it goes member by member.
         """
         return self.rate.backend.address(many=True), self.move.backend.address(many=self.lift is None)
+
+    @cached_property
+    def both(self) -> int:
+        """Where the step of two runs at once is, compiled for this rate when it is first asked for; 0 where it cannot be."""
+        offsets = [0, *accumulate(port.size for port in self.number_ports)]
+        inputs = [*(["X"] if self.lift is None else []), "y", "t", *(f"(n) + {place}" for place in offsets[:-1])]
+        flags = (
+            f"-DPAIR_RATE(X,y,t,n,rate)={self.rate.signature.symbol}_lanes({','.join(inputs)},rate)",
+            f"-DPAIR_SIZE={self.size}",
+            f"-DPAIR_PACKED={self.kept}",
+            f"-DPAIR_TURNS={self.turns}",
+            f"-DPAIR_FRONT={self.group}",
+            f"-DPAIR_NUMBERS={offsets[-1]}",
+            f"-DPAIR_NUMBER_SIZES={','.join(str(port.size) for port in self.number_ports)}{',' if self.number_ports else ''}0",
+        )
+        return self.rate.backend.beside("pair_two", "pair_two.c", two_files(), flags)
 
     @cached_property
     def lifting(self) -> int:

@@ -6,7 +6,7 @@ Arrays are C-contiguous, aligned, of double entries (complex ones as pairs); sha
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
@@ -65,6 +65,9 @@ class Backend(Protocol):
 
     def address(self, *, many: bool) -> int:
         """Where the C of `call` is, or of eight calls at once, with entry i of sample m at 8 i + m; 0 if there is none."""
+
+    def beside(self, symbol: str, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> int:
+        """Where a function of further C is that includes this kernel's over lanes; 0 if there is none."""
 
 
 class _Workspace:
@@ -175,6 +178,11 @@ class CtypesBackend:
             return ctypes.cast(self._call, ctypes.c_void_p).value or 0
         library = None if self._lanes is None else self._lanes.block(symbol)
         return 0 if library is None else ctypes.cast(library[f"{symbol}_block"], ctypes.c_void_p).value or 0
+
+    def beside(self, symbol: str, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> int:
+        library = None if self._lanes is None else self._lanes.beside(main, more_files, more_flags)
+        function = getattr(library, symbol, None)
+        return 0 if function is None else ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def load_library(path: Path) -> ctypes.CDLL:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -99,6 +99,9 @@ class InterpretedBackend:
     def address(self, *, many: bool) -> int:
         return 0
 
+    def beside(self, symbol: str, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> int:
+        return 0
+
 
 class Rounded:
     """A backend that computes in doubles, for arrays of floats."""
@@ -154,6 +157,9 @@ class Rounded:
         return 0
 
     def address(self, *, many: bool) -> int:
+        return 0
+
+    def beside(self, symbol: str, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> int:
         return 0
 
 

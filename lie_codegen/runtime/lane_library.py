@@ -11,6 +11,7 @@ import ctypes
 import threading
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lie_codegen.errors import CompileError, CompilerStoppedError
@@ -50,9 +51,19 @@ class LaneLibrary:
                 self._blocks[symbol] = self._library(("-DLCG_BLOCK", f"-DLCG_BLOCK_{symbol}"))
             return self._blocks[symbol]
 
-    def _library(self, more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
+    def beside(self, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
+        """A library of the file `main`, which includes PAIR_SOURCE, the sources of this one; None where it cannot be had."""
+        key = digest([main, dict(more_files), *more_flags])
+        with self._lock:
+            if key not in self._blocks:
+                self._blocks[key] = self._library(more_flags, main, more_files)
+            return self._blocks[key]
+
+    def _library(
+        self, more_flags: tuple[str, ...], main: str | None = None, more_files: Mapping[str, str] = MappingProxyType({})
+    ) -> ctypes.CDLL | None:
         try:
-            return ctypes.CDLL(str(self._find_or_compile(more_flags)))
+            return ctypes.CDLL(str(self._find_or_compile(more_flags, main, more_files)))
         except (OSError, CompileError, LookupError, ValueError, TypeError) as error:
             warn_degraded(BATCHES, str(error))
             return None
@@ -61,7 +72,7 @@ class LaneLibrary:
         """Samples at a time."""
         return int(self.open()[f"{self._entry.namespace}_lie_codegen_lanes"]())
 
-    def _find_or_compile(self, more_flags: tuple[str, ...]) -> Path:
+    def _find_or_compile(self, more_flags: tuple[str, ...], main: str | None, more_files: Mapping[str, str]) -> Path:
         home = self._entry.library.parent
         folder = home.parent.parent
         sources = cache.read_json(home / _SOURCES)
@@ -72,6 +83,10 @@ class LaneLibrary:
         compiler = next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
         flags = (*sources["flags"], *more_flags)
         key = digest(["lanes", home.name, compiler.identity, *flags])
+        if main is not None:
+            flags = (*flags, f'-DPAIR_SOURCE="{sources["main"]}"')
+            sources = {**sources, "files": {**sources["files"], **more_files}, "main": main}
+            key = digest([key, main, dict(more_files)])
         entry = cache.find_entry(folder, key)
         if entry is None:
             try:

@@ -16,6 +16,11 @@ def group_headers() -> dict[str, str]:
     return {**pair_headers(), "pair_control.h": _template("pair_control.h")}
 
 
+def two_files() -> dict[str, str]:
+    """The step of two runs of one system, which is compiled for its rate: the main file first."""
+    return {"pair_two.c": _template("pair_two.c"), "pair_two.h": _template("pair_two.h"), "ode_table.h": _step_table()}
+
+
 def dense_headers() -> dict[str, str]:
     """The headers of the solution within a step."""
     return {"pair_dense.h": _template("pair_dense.h"), "ode_dense.h": _dense_table()}
