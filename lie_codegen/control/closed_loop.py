@@ -205,9 +205,7 @@ def closed_loop(
         )
     if method not in ("auto", "gauss"):
         raise InputError(f'closed_loop: method is "auto" or "gauss", given {method!r}')
-    arguments = {
-        "group": group, "law": law, "inertia": inertia, "reference": reference, "t": t, "rtol": rtol, "tolerance": tolerance,
-        "step": step, "sample": sample, "delay": delay, "noise": noise, "limits": limits, "disturbance": disturbance,
-        "external": external, "observer": observer, "gains": gains, "order": order,
-    }  # fmt: skip
-    return loop_by(method, prepared(method, arguments), X0, xi0, states or {}, seed, runs, first, threads, events)
+    told = (  # as `TOLD` names them
+        group, law, inertia, reference, t, rtol, tolerance, step, sample, delay, noise, limits, disturbance, external, observer, gains, order
+    )  # fmt: skip
+    return loop_by(method, prepared(method, told), X0, xi0, states or {}, seed, runs, first, threads, events)

@@ -64,11 +64,10 @@ def adaptive(run: Run, tolerance: float) -> PairRun:
     """
     system = _system(run)
     X0, behind = _parted(run.loop, run.start)
-    y0 = np.zeros((len(behind), system.group + behind.shape[1]))
+    y0 = np.zeros((len(behind), system.size))
     y0[:, system.group :] = behind
     return integrate(
-        system, np.ascontiguousarray(X0), y0, run.times, rtol=_ROUNDING, atol=tolerance,
-        where=f"closed_loop({run.loop.plant.namespace})", threads=run.threads,
+        system, X0, y0, run.times, rtol=_ROUNDING, atol=tolerance, where=f"closed_loop({run.loop.plant.namespace})", threads=run.threads
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ enough for. What may differ another time though it looks the same, a Python func
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -27,6 +27,11 @@ from lie_codegen.values import Value
 
 #: Bytes of an array, and entries of a sequence, up to which a call is worth knowing again: beyond, what they are for takes longer.
 _BYTES, _ENTRIES = 2**15, 64
+#: The arguments that a loop is known by.
+TOLD = (
+    "group", "law", "inertia", "reference", "t", "rtol", "tolerance", "step", "sample", "delay", "noise", "limits", "disturbance", "external",
+    "observer", "gains", "order",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +57,7 @@ class Prepared:
 class _Call(tuple[Hashable, ...]):
     """A key, with the arguments that it stands for."""
 
-    arguments: Mapping[str, Any]
+    arguments: Sequence[Any]
 
 
 class _UnknowableError(Exception):
@@ -66,14 +71,14 @@ class _WarnedError(Exception):
         self.made = made
 
 
-def prepared(method: str, arguments: Mapping[str, Any]) -> Prepared:
-    """The loop of these arguments of `loop_arguments`, prepared now or before.
+def prepared(method: str, arguments: Sequence[Any]) -> Prepared:
+    """The loop of these arguments of `loop_arguments`, in the order of `TOLD`, prepared now or before.
 
     Raises:
         InputError, ShapeError, NotFiniteError: naming the argument.
     """
     try:
-        call = _Call((method, *[None if value is None else _known(value) for value in arguments.values()]))
+        call = _Call([method, *[None if value is None else _known(value) for value in arguments]])
     except _UnknowableError:
         return _prepare(method, arguments)
     call.arguments = arguments
@@ -86,7 +91,7 @@ def prepared(method: str, arguments: Mapping[str, Any]) -> Prepared:
 @lru_cache(maxsize=64)
 def _kept(call: _Call) -> Prepared:
     # the key lives as long as what it is the key of, and with it the laws that it knows by identity; arrays are the caller's to change
-    before, call.arguments = warnings_given(), {name: _own(value) for name, value in call.arguments.items()}
+    before, call.arguments = warnings_given(), [_own(value) for value in call.arguments]
     made = _prepare(str(call[0]), call.arguments)
     for value in (made.told.times, *made.numbers.values()):
         value.flags.writeable = False
@@ -111,9 +116,10 @@ def _known(value: Any) -> Hashable:
         _UnknowableError: it may change, or is large.
     """
     kind = type(value)
-    if kind is np.ndarray and value.dtype.kind in "fiub" and value.nbytes <= _BYTES:
-        return value.shape, value.dtype, value.tobytes()
-    if value is None or kind is float or kind is int or kind is bool:
+    if kind is np.ndarray:
+        if value.nbytes <= _BYTES and value.dtype.kind in "fiub":
+            return value.shape, value.dtype.str, value.tobytes()
+    elif value is None or kind is float or kind is int or kind is bool:
         return kind, value
     if kind is str and not value.endswith(".toml") and value != "-":
         return kind, value
@@ -128,7 +134,8 @@ def _known(value: Any) -> Hashable:
     raise _UnknowableError
 
 
-def _prepare(method: str, arguments: Mapping[str, Any]) -> Prepared:
+def _prepare(method: str, values: Sequence[Any]) -> Prepared:
+    arguments = dict(zip(TOLD, values, strict=True))
     told = loop_arguments(**arguments)
     by_rate = told.kind == "continuous" and (told.step is None or method == "gauss")
     loop, library = loop_library(told.model, told.reference, "adaptive" if by_rate else told.kind)

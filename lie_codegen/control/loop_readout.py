@@ -41,7 +41,11 @@ def result_of(
     pair = found if isinstance(found, PairRun) else None
     X, xi = loop.plant.split(found) if isinstance(found, np.ndarray) else motion_of(run, found)
     moves = run.reference(times)
-    steps = count * round((times[-1] - times[0]) / (run.sample or float(times[1] - times[0]))) if pair is None else pair.steps
+    steps = (
+        count * round((times[-1] - times[0]) / (run.sample or float(times[1] - times[0])))
+        if pair is None
+        else pair.steps
+    )
     making = LoopMaking(run, told.model, told.reference, told.rtol, count, pair)
     said = _Said(run, found, moves)
     if loop.plant.order == 1 and loop.law is not None:

@@ -82,7 +82,8 @@ def _run(
             check_once(told.reference, *ends, library.reference)
     start, many = model.plant.starts(X0, xi0)
     start, many = several(start, many, loop.loops, runs)
-    start = initial_own(model, start, {**told.start, **states})
+    if states or model.own_ports:
+        start = initial_own(model, start, {**told.start, **states})
     stream = noise_stream(model, _whole(seed, "seed", 0), _whole(first, "first", 0))
     sample = told.sample or 0.0
     return Run(

@@ -149,18 +149,17 @@ def integrate(
         return _to_tolerance(system, X0, y0, times, rtol, atol, where)[0]
     some = min(max(_PILOT, len(X0) // _PART), _LARGEST_PILOT, len(X0))
     chosen = np.linspace(0, len(X0) - 1, some).astype(int)
-    pilot, local = _to_tolerance(system.of_members(chosen), X0[chosen], y0[chosen], times, rtol, atol, where)
-
-    return _many(system, X0, y0, times, *local, where, threads).estimated(pilot.error_estimate)
+    pilot, share = _to_tolerance(system.of_members(chosen), X0[chosen], y0[chosen], times, rtol, atol, where)
+    whole = _many(system, X0, y0, times, *_local(rtol, atol, share), where, threads)
+    return whole.estimated(pilot.error_estimate)
 
 
 def _to_tolerance(
     system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, where: str
-) -> tuple[PairRun, tuple[float, float]]:
-    """A run whose difference to one with larger local errors says that it is good enough, and its local tolerances.
+) -> tuple[PairRun, float]:
+    """A run whose difference to one with larger local errors says that it is good enough, and what part of the tolerance its local errors are.
 
-    Of several members, which are a pilot, the tolerances are those with which others like them are good enough, with the error
-    that is then allowed for.
+    Of several members, which are a pilot, that with which others like them are good enough, with the error that is then allowed for.
     """
     # The error of a run is in proportion to its local tolerance: of two whose tolerances differ by a factor r the
     # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
@@ -174,14 +173,13 @@ def _to_tolerance(
     shorter = 1.0
     for _ in range(_MOST_RUNS):
         share /= _RATIO
-        local = _local(rtol, atol, share)
         if free:  # where the reach limits steps two runs would be the same
             shorter *= _SHORTER
         if found is not None:
             fine, difference, size, steps = found
             found = None
         elif coarse is not None:
-            fine, steps = _once(system.within(shorter), X0, y0, times, *local, where), coarse.steps
+            fine, steps = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where), coarse.steps
             difference, size = _difference(system, fine, coarse, times, free), max(_size(fine.X), _size(fine.y))
         scale = max(1.0, size)
         # errors go as the eighth power of the steps: where these hardly became shorter, the tolerances promise too much
@@ -192,10 +190,10 @@ def _to_tolerance(
         goal = max(rtol * scale, atol, floor)
         if estimate <= goal:
             if one:
-                return fine.estimated(max(estimate, floor)), local
+                return fine.estimated(max(estimate, floor)), share
             slack = min(max(goal / (_MARGIN * max(estimate, floor)), 1 / _MARGIN), _RATIO)
-            of_others = max(slack * local[0], _SMALLEST), max(slack * local[1], _SMALLEST)
-            return fine.estimated(max(_MARGIN * slack * estimate, floor)), of_others
+            return fine.estimated(max(_MARGIN * slack * estimate, floor)), slack * share
+        local = _local(rtol, atol, share)
         if local[1] <= _SMALLEST:
             break
         needed = estimate / max(rtol * scale, atol)
@@ -327,10 +325,10 @@ def _twice(
     if steps > _STEPS:
         return None
     try:
-        room = system.idle.pop()  # pop and append are atomic: nobody else uses it
+        room: _Room = system.idle.pop()  # pop and append are atomic: nobody else uses it
+        if room.shape != (len(times), steps):
+            raise IndexError
     except IndexError:
-        room = _Room(system, len(times), steps, free)
-    if room.shape != (len(times), steps):
         room = _Room(system, len(times), steps, free)
     found = room.run(X0, y0, times, (rtol, atol, share))
     if room.shape[0] <= _MOST_TIMES_KEPT:
@@ -371,7 +369,9 @@ class _Room:
         self._pair, self._both, at = system.record(), Twice(), [block.ctypes.data + 8 * place for place in places]
         pair, both = self._pair, self._both
         both.start, _, both.found, pair.times, pair.X_out, pair.y_out, both.other, both.knots = at[:first]
-        pair.work, pair.X, pair.y, pair.dense, pair.knot_t, pair.knot_h, pair.knot_X, pair.knot_y = at[first : first + 8]
+        pair.work, pair.X, pair.y, pair.dense, pair.knot_t, pair.knot_h, pair.knot_X, pair.knot_y = at[
+            first : first + 8
+        ]
         if free:
             pair.knot_slope, pair.knot_theta = at[first + 8 : first + 10]
         pair.count, pair.room, pair.both = k, steps, system.both

@@ -72,7 +72,10 @@ def pair_library() -> Any:
         return {
             "pair853.c": text,
             **group_headers(),
-            **{name: (template_folder() / name).read_text(encoding="utf-8") for name in ("pair_hermite.h", "pair_two.h")},
+            **{
+                name: (template_folder() / name).read_text(encoding="utf-8")
+                for name in ("pair_hermite.h", "pair_two.h")
+            },
         }
 
     try:

@@ -9,7 +9,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.errors import ShapeError
 from lie_codegen.groups.maps.admission import admitted, admitted_all
 from lie_codegen.groups.maps.element_pattern import packed_size
-from lie_codegen.groups.maps.packed_arrays import elements_of, identity_of, packed_elements
+from lie_codegen.groups.maps.packed_arrays import elements_of, form_of, packed_by, packed_elements
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.outputs import copied
 
@@ -21,12 +21,13 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
         ShapeError: X0 or xi0 has another shape.
         NotOnGroupError: X0 is off the group by more than 1e-5; nearer ones are projected.
     """
-    n, identity = group.dim, identity_of(group)
+    n, form = group.dim, form_of(group)
+    identity = form.identity
     d = len(identity)
     X = identity if X0 is None else np.asarray(X0, dtype=identity.dtype)
     xi = np.zeros(n) if xi0 is None else np.asarray(xi0, dtype=float)
     if X.shape == (d, d) and xi.shape == (n,):
-        packed = packed_elements(group, X if X is identity else admitted(group, X, "X0").X)
+        packed = packed_by(form, X if X is identity else admitted(group, X, "X0").X)
         state = np.empty((1, len(packed) + n))
         state[0, : len(packed)], state[0, len(packed) :] = packed, xi
         return state, False

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from lie_codegen.errors import CompileError, CompilerStoppedError
@@ -32,6 +31,7 @@ class LaneLibrary:
 
     def __init__(self, entry: cache.Entry, scalar: ctypes.CDLL) -> None:
         self._entry = entry
+        self._folder = entry.library.parent.parent.parent
         self._scalar = scalar
         self._lock = threading.Lock()
         self._opened: ctypes.CDLL | None = None
@@ -53,17 +53,18 @@ class LaneLibrary:
 
     def beside(self, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
         """A library of the file `main`, which includes PAIR_SOURCE, the sources of this one; None where it cannot be had."""
-        key = digest([main, dict(more_files), *more_flags])
+        key = digest(["beside", self._entry.library.parent.name, main, dict(more_files), *more_flags])
         with self._lock:
             if key not in self._blocks:
-                self._blocks[key] = self._library(more_flags, main, more_files)
+                self._blocks[key] = self._opened_at(lambda: self._beside(key, main, more_files, more_flags))
             return self._blocks[key]
 
-    def _library(
-        self, more_flags: tuple[str, ...], main: str | None = None, more_files: Mapping[str, str] = MappingProxyType({})
-    ) -> ctypes.CDLL | None:
+    def _library(self, more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
+        return self._opened_at(lambda: self._find_or_compile(more_flags))
+
+    def _opened_at(self, place: Callable[[], Path]) -> ctypes.CDLL | None:
         try:
-            return ctypes.CDLL(str(self._find_or_compile(more_flags, main, more_files)))
+            return ctypes.CDLL(str(place()))
         except (OSError, CompileError, LookupError, ValueError, TypeError) as error:
             warn_degraded(BATCHES, str(error))
             return None
@@ -72,29 +73,38 @@ class LaneLibrary:
         """Samples at a time."""
         return int(self.open()[f"{self._entry.namespace}_lie_codegen_lanes"]())
 
-    def _find_or_compile(self, more_flags: tuple[str, ...], main: str | None, more_files: Mapping[str, str]) -> Path:
+    def _beside(self, key: str, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> Path:
+        entry = cache.find_entry(self._folder, key)
+        if entry is not None:  # without the sources, which take a millisecond to read
+            return entry.library
+        sources, compiler = self._sources()
+        flags = (*sources["flags"], *more_flags, f'-DPAIR_SOURCE="{sources["main"]}"')
+        whole = {**sources, "files": {**sources["files"], **more_files}, "main": main}
+        return self._compiled(key, whole, compiler, flags)
+
+    def _find_or_compile(self, more_flags: tuple[str, ...]) -> Path:
+        sources, compiler = self._sources()
+        flags = (*sources["flags"], *more_flags)
+        key = digest(["lanes", self._entry.library.parent.name, compiler.identity, *flags])
+        entry = cache.find_entry(self._folder, key)
+        return self._compiled(key, sources, compiler, flags) if entry is None else entry.library
+
+    def _sources(self) -> tuple[Mapping[str, Any], Compiler]:
+        """What the library was compiled from, and the compiler that did."""
         home = self._entry.library.parent
-        folder = home.parent.parent
         sources = cache.read_json(home / _SOURCES)
         if not isinstance(sources, dict):
             cache.unlink(home / "entry.json")  # the next process builds the whole entry again
             raise ValueError("the sources of the lanes are gone or damaged")
         compilers = find_compilers()
-        compiler = next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
-        flags = (*sources["flags"], *more_flags)
-        key = digest(["lanes", home.name, compiler.identity, *flags])
-        if main is not None:
-            flags = (*flags, f'-DPAIR_SOURCE="{sources["main"]}"')
-            sources = {**sources, "files": {**sources["files"], **more_files}, "main": main}
-            key = digest([key, main, dict(more_files)])
-        entry = cache.find_entry(folder, key)
-        if entry is None:
-            try:
-                entry = self._locked(folder, key, sources, compiler, flags)
-            except OSError as error:
-                folder = temporary_folder(f"the cache folder {folder} cannot be written: {error.strerror or error}")
-                entry = self._locked(folder, key, sources, compiler, flags)
-        return entry.library
+        return sources, next((each for each in compilers if each.identity == sources["compiler"]), compilers[0])
+
+    def _compiled(self, key: str, sources: Mapping[str, Any], compiler: Compiler, flags: tuple[str, ...]) -> Path:
+        try:
+            return self._locked(self._folder, key, sources, compiler, flags).library
+        except OSError as error:
+            folder = temporary_folder(f"the cache folder {self._folder} cannot be written: {error.strerror or error}")
+            return self._locked(folder, key, sources, compiler, flags).library
 
     def _locked(
         self, folder: Path, key: str, sources: Mapping[str, Any], compiler: Compiler, flags: tuple[str, ...]

@@ -95,6 +95,7 @@ def _matrix(group: MatrixGroup, X: ArrayLike, where: str) -> Array:
     if matrix.shape != (d, d):
         raise ShapeError(f"{where} has shape {matrix.shape}; an element of {group.name} is ({d}, {d})")
     # a sum of squares is finite only where all of them are; one of finite entries may leave the range
-    if not isfinite(np.vdot(matrix, matrix).real) and not np.all(np.isfinite(matrix)):
+    entries = matrix.reshape(-1)
+    if not isfinite(abs(entries.dot(entries))) and not np.all(np.isfinite(matrix)):
         raise NotFiniteError(f"{where} holds NaN or infinity")
     return matrix

@@ -14,7 +14,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.outputs import copied, empty
 
 
-class _Form(NamedTuple):
+class Form(NamedTuple):
     """How elements of a group are packed.
 
     Attributes:
@@ -29,22 +29,27 @@ class _Form(NamedTuple):
 
 
 @lru_cache(maxsize=128)
-def _form(group: MatrixGroup) -> _Form:
+def form_of(group: MatrixGroup) -> Form:
+    """How elements of the group are packed, found once."""
     d, dtype = group.degree, group.basis.dtype
     rows, columns = np.array(varying_entries(group), dtype=np.intp).T
     identity = np.eye(d, dtype=dtype)
     identity.flags.writeable = False
-    return _Form(dtype, None if len(rows) == d**2 else rows * d + columns, identity)
+    return Form(dtype, None if len(rows) == d**2 else rows * d + columns, identity)
 
 
 def identity_of(group: MatrixGroup) -> Array:
     """(d, d) the identity, one array for all who ask, which cannot be written to."""
-    return _form(group).identity
+    return form_of(group).identity
 
 
 def packed_elements(group: MatrixGroup, X: Array) -> Array:
     """(..., size) the varying entries of elements (..., d, d), row by row, complex ones as re, im; X itself where all entries vary."""
-    form = _form(group)
+    return packed_by(form_of(group), X)
+
+
+def packed_by(form: Form, X: Array) -> Array:
+    """The same by a form."""
     entries = np.ascontiguousarray(X, dtype=form.dtype).reshape(*X.shape[:-2], -1)
     if form.places is not None:
         entries = entries.take(form.places, axis=-1)
@@ -53,7 +58,7 @@ def packed_elements(group: MatrixGroup, X: Array) -> Array:
 
 def elements_of(group: MatrixGroup, packed: Array) -> Array:
     """X (..., d, d) of packed elements (..., size), in memory of its own."""
-    form = _form(group)
+    form = form_of(group)
     shape = (*packed.shape[:-1], *form.identity.shape)
     if form.places is None:  # row by row, as they stand in the matrix
         entries = copied(packed)
