@@ -115,7 +115,7 @@ def c_float_literal(value: float) -> str:
     return f"({text}f)" if text.startswith("-") else f"{text}f"
 
 
-_CALLED = re.compile(r"\b(" + "|".join(sorted(_FUNCTIONS | {"floor", "ldexp"})) + r")\(")
+_CALLED = re.compile(r"\b(" + "|".join(sorted(_FUNCTIONS | {"floor", "hypot", "ldexp"})) + r")\(")
 _FLOATING = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.])")
 
 

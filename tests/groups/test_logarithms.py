@@ -265,6 +265,21 @@ def test_known_answers_come_back_with_the_conditioning_of_the_inverse_jacobian()
         assert np.linalg.norm(group.hat(x) - A) < 4e-15 * 2 * np.pi / (3 * delta) + 1e-13
 
 
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("name", ["gl2", "gl3", "sl3", "sp4", "su3", "so5", "so4"])
+def test_elements_whose_squares_are_no_numbers(name: str, real: str) -> None:
+    """log(1 + E) = E for |E| = 1e-160, in floats 1e-25, where squares of entries made NaN."""
+    group = lc.group(name)
+    log = compiled(group)
+    small = 1e-160 if real == "double" else 1e-25
+    E = group.hat(small * np.ones(group.dim))
+    np.fill_diagonal(E, 0)
+    (L,) = log.batch(np.array([np.eye(group.degree) + E]), real=real)
+    np.testing.assert_allclose(
+        group.hat(L.astype(float)), E, rtol=1e-15 if real == "double" else 1e-6, atol=1e-15 * small
+    )
+
+
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow"]
 SANITIZE = ["-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 DRIVER = """#include <math.h>

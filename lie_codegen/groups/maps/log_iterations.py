@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
 from lie_codegen.on_demand import scipy
@@ -13,6 +16,9 @@ def unitary_log(X: Array, *, special: bool) -> Array:
 
     Then the sum is 2 pi k, and the k largest angles go back by a turn (|k| smallest forward): the shortest of all choices.
     """
+    near = _near_log(X)
+    if near is not None:
+        return np.asarray((near - near.conj().T) / 2)
     T, Q = scipy.linalg.schur(X, output="complex")
     theta = np.angle(np.diag(T))
     turns = round(float(np.sum(theta)) / (2 * np.pi)) if special else 0
@@ -25,6 +31,9 @@ def unitary_log(X: Array, *, special: bool) -> Array:
 def rotation_log(X: Array) -> Array:
     """The real logarithm of a rotation, angles up to pi; eigenvalues -1 are paired in the order of the Schur form."""
     n = len(X)
+    near = _near_log(X)
+    if near is not None:
+        return np.asarray((near - near.T) / 2)
     T, Q = scipy.linalg.schur(X, output="real")
     A = np.zeros((n, n))
     halves, k = [], 0
@@ -45,6 +54,9 @@ def rotation_log(X: Array) -> Array:
 
 def matrix_log(X: Array) -> Array:
     """The principal logarithm: square roots of the Schur form until it is near 1, the [8/8] Pade approximant, the diagonal exactly."""
+    near = _near_log(X)
+    if near is not None:
+        return near
     T, Q = scipy.linalg.schur(X.astype(complex), output="complex")
     diagonal = np.log(np.abs(np.diag(T))) + 1j * np.angle(np.diag(T))
     power = 1.0
@@ -53,15 +65,22 @@ def matrix_log(X: Array) -> Array:
             break
         T = _triangular_root(T)
         power *= 2
-    E = T - np.eye(len(T))
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    L = sum(
-        weight / 2 * scipy.linalg.solve_triangular(np.eye(len(T)) + (node + 1) / 2 * E, E)
-        for node, weight in zip(nodes, weights, strict=True)
-    )
-    L = power * L
+    L = power * _pade(T - np.eye(len(T)))
     np.fill_diagonal(L, diagonal)
     return np.asarray(Q @ L @ Q.conj().T)
+
+
+def _near_log(X: NDArray[Any]) -> NDArray[Any] | None:
+    """log X where |X - 1| < 1/4, with an error relative to X - 1 and not to 1."""
+    E = X - np.eye(len(X))
+    return _pade(E) if np.max(np.sum(np.abs(E.real) + np.abs(E.imag), axis=0)) < 0.25 else None
+
+
+def _pade(E: NDArray[Any]) -> NDArray[Any]:
+    """log(1 + E), the integral of (1 + s E)^{-1} E over s in [0, 1], by Gauss's sum, the [8/8] Pade approximant."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    parts = [w / 2 * np.linalg.solve(np.eye(len(E)) + (s + 1) / 2 * E, E) for s, w in zip(nodes, weights, strict=True)]
+    return np.asarray(sum(parts))
 
 
 def _triangular_root(T: Array) -> Array:

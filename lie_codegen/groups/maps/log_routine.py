@@ -45,7 +45,8 @@ _FAR, _FAR_RESIDUAL = 0.1, 1e-3
 
 
 class _Rounding(NamedTuple):
-    """What counts as zero on the way, as C constants: `off`, `pivot`, `symmetric`, `kernel` bound squares."""
+    """What counts as zero on the way, as C constants: `off`, `pivot`, `symmetric`, `kernel`, `least` and `most` bound squares, these two where they
+    are normal numbers; below `nothing` there is no reciprocal."""
 
     off: str
     pivot: str
@@ -63,6 +64,9 @@ class _Rounding(NamedTuple):
     independent: str
     turn: str
     cost: str
+    least: str
+    most: str
+    nothing: str
 
 
 _DOUBLE = _Rounding(
@@ -82,6 +86,9 @@ _DOUBLE = _Rounding(
     independent="1e-6",
     turn="1e-5",
     cost="1e-6",
+    least="1e-280",
+    most="1e300",
+    nothing="1e-305",
 )
 _SINGLE = _Rounding(
     off="1e-13",
@@ -100,6 +107,9 @@ _SINGLE = _Rounding(
     independent="3e-4",
     turn="1e-3",
     cost="1e-4",
+    least="1e-31",
+    most="1e36",
+    nothing="1e-37",
 )
 
 
