@@ -77,9 +77,11 @@ def _ordered(values: Sequence[complex]) -> bool:
 
 def symmetric_sums(nodes: Sequence[Number], mean: Number) -> list[complex]:
     """h_0, h_1, ... of nodes - mean: the coefficients of prod 1/(1 - (l - mean) t)."""
-    sums = [sp.S.One] + [sp.S.Zero] * TERMS
+    # Real and imaginary parts apart: SymPy leaves a product of complex numbers as it is written.
+    real, imaginary = [sp.S.One] + [sp.S.Zero] * TERMS, [sp.S.Zero] * (TERMS + 1)
     for node in nodes:
-        shift = sp.N(sp.expand(node - mean), 40)
+        re, im = sp.N(sp.expand(node - mean), 40).as_real_imag()
         for k in range(1, TERMS + 1):
-            sums[k] = sums[k] + shift * sums[k - 1]
-    return [complex(value) for value in sums]
+            a, b = real[k - 1], imaginary[k - 1]
+            real[k], imaginary[k] = real[k] + re * a - im * b, imaginary[k] + re * b + im * a
+    return [complex(re, im) for re, im in zip(real, imaginary, strict=True)]

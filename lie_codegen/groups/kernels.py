@@ -19,6 +19,9 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lie_codegen.errors import InputError
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
@@ -242,12 +245,21 @@ def _sampler(data: GroupDerivation, inputs: Sequence[Port]) -> Sampler:
 
 
 def _draw(data: GroupDerivation, port: Port, rng: random.Random) -> Any:
-    """A vector in [-1, 1]^n, or an element of the group well inside the domain of the logarithm."""
-    x: list[Scalar] = [rng.uniform(-1, 1) for _ in range(data.group.dim)]
+    """A vector in [-1, 1]^n, shorter where basis matrices are larger than 1, or an element of the group inside the domain of the logarithm."""
+    n = data.group.dim
+    x: list[Scalar] = [rng.uniform(-1, 1) for _ in range(n)]
+    path = sum(abs(c) * _norm(A) for c, A in zip(x, data.group.basis, strict=True))
     if len(port.shape) == 1:
-        return x
-    size = max(1.0, sum(c * c for c in x) ** 0.5)
+        return [c / max(1.0, path / n) for c in x]
+    # exp(x_1 A_1) ... exp(x_n A_n) has a real logarithm where the path is below pi: Magnus's series converges (Moan and Niesen 2008).
+    size = max(1.0, sum(c * c for c in x) ** 0.5, path / 3.0)
     return wei_norman_body.product_exp(FloatArithmetic(), data.wei_norman, [c / size for c in x])
+
+
+def _norm(A: NDArray[Any]) -> float:
+    """A bound of the spectral norm, (|A|_1 |A|_inf)^(1/2)."""
+    sizes = np.abs(A)
+    return float(np.sqrt(sizes.sum(axis=0).max() * sizes.sum(axis=1).max()))
 
 
 def _vector(data: GroupDerivation, name: str, per: str = "") -> Port:

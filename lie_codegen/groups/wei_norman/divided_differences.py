@@ -13,6 +13,9 @@ from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 from lie_codegen.on_demand import sympy as sp
 
+#: Nodes this near to one another are one.
+_EQUAL = 1e-20
+
 
 class DividedDifferences:
     """f[l_i, ..., l_j] of f(l) = e^{x l}, each computed once."""
@@ -54,7 +57,8 @@ class DividedDifferences:
         mean = sp.expand(sum(run, sp.S.Zero) / len(run))
         spread = max(float(abs(sp.N(node - mean, 30))) for node in run)
         near = self._series(run, mean)
-        if spread == 0:
+        # Equal nodes may be written differently, as radicals are: thirty digits then leave some 1e-31. The series serves every |x| < 1/spread.
+        if spread < _EQUAL:
             return near
         gap = complex(sp.N(sp.expand(run[-1] - run[0]), 30))
         far = _minus(self.difference(i + 1, j), self.difference(i, j - 1))

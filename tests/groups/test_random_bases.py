@@ -1,0 +1,34 @@
+"""Groups in random rational bases: eigenvalues that are conjugate and written as radicals, elements far out for small coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+from generators import generic_basis
+
+import lie_codegen as lc
+from lie_codegen.codegen.vectors import make_vectors
+
+
+@pytest.mark.parametrize("name", ["so4", "so31", "sp4", "sl3"])
+def test_products_of_exponentials(name: str) -> None:
+    """Newton's form over complex nodes: its symmetric sums took minutes on so31, and equal nodes were told apart on so4."""
+    group = generic_basis(lc.group(name), np.random.default_rng(5))
+    product_exp = lc.build(group, kernels=("product_exp",)).product_exp
+    x = np.random.default_rng(3).uniform(-0.3, 0.3, size=(20, group.dim))
+    for row, X in zip(x, product_exp.batch(x), strict=True):
+        wanted = np.eye(group.degree)
+        for c, e in zip(row, np.eye(group.dim), strict=True):
+            wanted = wanted @ scipy.linalg.expm(group.hat(c * e))
+        assert np.max(np.abs(X - wanted)) < 1e-14 * np.max(np.abs(wanted))
+
+
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("name", ["sl2", "so3", "sim2"])
+def test_elements_of_the_vectors_have_logarithms(name: str, real: str) -> None:
+    """Coordinates in [-1, 1] of large matrices gave elements of SL(2) with eigenvalues below zero, and no package."""
+    for seed in range(3):
+        group = generic_basis(lc.group(name), np.random.default_rng(seed))
+        (log,) = [kernel for kernel in lc.group_kernels(group) if kernel.name == "log"]
+        assert all(np.isfinite(vector.outputs[0]).all() for vector in make_vectors(log, real=real))
