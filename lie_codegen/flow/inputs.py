@@ -16,7 +16,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.identifiers import shown
 from lie_codegen.recent import Recent
 from lie_codegen.runtime.formula_input import FormulaInput, formula_input, fourier_input, lines_input
-from lie_codegen.values import Value, contents
+from lie_codegen.values import Value, contents, settle
 
 if TYPE_CHECKING:
     from lie_codegen.signals.resolved_input import ResolvedInput
@@ -133,7 +133,10 @@ def drive_signal(drive: Drive, t: Array) -> Signal:
 
 
 def _of_formula(formula: FormulaInput, t: Array) -> Signal:
-    """The formula; by numpy, of the first trajectory, where Python asks for values."""
+    """The formula; by numpy, of the first trajectory, where Python asks for values. Kept beside a formula that is smooth at all times."""
+    kept: Signal | None = vars(formula).get("_signal")
+    if kept is not None:
+        return kept
     one = formula if formula.trajectories is None else formula.trajectory(0)
 
     def evaluate(s: Array) -> Array:
@@ -141,8 +144,10 @@ def _of_formula(formula: FormulaInput, t: Array) -> Signal:
 
     inside = formula.breakpoints
     if len(inside):
-        inside = inside[(inside >= t[0]) & (inside <= t[-1])]
-    return Signal(formula.dim, evaluate, inside, formula)
+        return Signal(formula.dim, evaluate, inside[(inside >= t[0]) & (inside <= t[-1])], formula)
+    made = Signal(formula.dim, evaluate, inside, formula)
+    settle(formula, _signal=made)
+    return made
 
 
 def _breakpoints(u: Any, t: Array) -> Array:

@@ -34,6 +34,7 @@ from lie_codegen.flow.trajectory import Trajectory
 from lie_codegen.groups.catalogue_load import GroupLike, as_group
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.patience import shows_progress
+from lie_codegen.values import made_of
 
 METHODS = ("auto", "magnus8", "magnus6", "magnus4", *FOURTH_ORDER)
 
@@ -158,9 +159,10 @@ def simulate(
         from lie_codegen.flow.magnus.events import run_events
 
         hits = run_events(group, drive, times, start, tuple(events), asked, order, run.longest)
-    return Trajectory(
-        group, times, X, run.steps, run.error_estimate, method if method in FOURTH_ORDER else f"magnus{order}",
-        drive.evaluations, drive.resolution, hits, drive, goal, run.multiple,
+    return made_of(
+        Trajectory, group=group, t=times, X=X, steps=run.steps, error_estimate=run.error_estimate,
+        method=method if method in FOURTH_ORDER else f"magnus{order}", evaluations=drive.evaluations, resolution=drive.resolution,
+        events=hits, drive=drive, rtol=goal, multiple=run.multiple,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.flow.magnus.norms import size_of
 from lie_codegen.kernel.saved import Saved
 from lie_codegen.runtime.formula_input import FormulaInput
+from lie_codegen.values import settle
 
 if TYPE_CHECKING:
     from lie_codegen.signals.resolved_input import ResolvedInput
@@ -127,10 +128,14 @@ class Drive(Saved):
 
 
 def formula_drive(formula: FormulaInput, factor: Array) -> Drive:
-    """A Fourier series or straight pieces, times a number or (N,) numbers."""
+    """A Fourier series or straight pieces, times a number or (N,) numbers; that of a number is kept beside the formula for the next run."""
+    kept: Drive | None = None if factor.ndim else vars(formula).get("_drive")
+    if kept is not None and kept.factor[0] == factor:
+        return kept
     row, many = _row(factor)
+    row.flags.writeable = False
     none = np.empty((0, 0, formula.dim))
-    return Drive(
+    made = Drive(
         formula,
         formula.rates,
         formula.rates_low,
@@ -143,6 +148,9 @@ def formula_drive(formula: FormulaInput, factor: Array) -> Drive:
         0.0,
         formula.times,
     )
+    if many is None:
+        settle(formula, _drive=made)
+    return made
 
 
 def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
@@ -155,5 +163,5 @@ def resolved_drive(u: ResolvedInput, factor: Array) -> Drive:
 
 
 def _row(factor: Array) -> tuple[Array, int | None]:
-    row = np.ascontiguousarray(factor, dtype=float)  # of a number a row of one
+    row = np.array(factor, dtype=float, ndmin=1)  # of a number a row of one
     return row, len(row) if np.ndim(factor) else None

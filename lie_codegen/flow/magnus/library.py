@@ -16,6 +16,7 @@ from lie_codegen.flow.magnus.steps import Steps
 from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.runtime.backend import load_library
 from lie_codegen.runtime.sources import build_source
+from lie_codegen.values import settle
 
 #: Plain C, beside the header that is made for the group.
 _HEADERS = tuple(f"magnus_{name}.h" for name in ("words", "lanes", "given", "input", "exponent", "move", "space"))
@@ -197,7 +198,10 @@ def _table_input(values: Array, projection: Array) -> Input:
 
 
 def read_by(drive: Drive, who: int) -> Input:
-    """The drive of trajectory `who` as the C reads it; the drive's arrays have to stay."""
+    """The drive of trajectory `who` as the C reads it; the drive's arrays have to stay. That of the first is kept beside it: nobody writes to it."""
+    kept: Input | None = None if who else vars(drive).get("_read")
+    if kept is not None:
+        return kept
     formula = drive.formula
     rate, rate_low, cosines, sines, left, right = formula.addresses
     if drive.rates is not formula.rates:
@@ -206,7 +210,7 @@ def read_by(drive: Drive, who: int) -> Input:
     rate_stride = drive.rates.shape[-1] if drive.rates.ndim == 2 else 0
     factor_stride = int(len(drive.factor) > 1)
     times = drive.times
-    return Input(
+    made = Input(
         rates=drive.rates.shape[-1], wave_stride=waves, rate=rate + 8 * who * rate_stride,
         rate_low=rate_low + 8 * who * rate_stride,
         rate_stride=rate_stride, cosines=cosines + 8 * who * waves, sines=sines + 8 * who * waves,
@@ -214,6 +218,9 @@ def read_by(drive: Drive, who: int) -> Input:
         line_stride=lines, terms=drive.terms, series=drive.series.ctypes.data if drive.terms else None, factor=drive.factor.ctypes.data + 8 * who * factor_stride,
         factor_stride=factor_stride,
     )  # fmt: skip
+    if not who:
+        settle(drive, _read=made)
+    return made
 
 
 def grid_of(steps: Steps) -> _Grid:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,8 +41,7 @@ _NOT_REACHED = (
 _OUT_OF_RANGE = "{where}: the solution left the range of double precision"
 
 
-@dataclass(frozen=True, eq=False)
-class MagnusRun:
+class MagnusRun(NamedTuple):
     """X at the times after the first; (k, d, d) or (k, N, d, d).
 
     Attributes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 
 REACHED, TOO_MANY_AT_FIRST, TOO_MANY, NOT_FINITE, LONG = range(5)
 _TASKS_KEPT, _MOST_TIMES_KEPT = 4, 4096
+_NOTHING = Input()
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
+class Solved(NamedTuple):
     """What a run found.
 
     Attributes:
@@ -86,7 +86,7 @@ class Solver:
         task.X0[:] = X0
         task.arguments.u = read_by(drive, 0)
         solved = task.run(order, rtol, atol, most, block)
-        task.arguments.u = Input()
+        task.arguments.u = _NOTHING
         self.give_back(shape, task)
         return solved
 
