@@ -17,8 +17,8 @@ Polynomial = dict[tuple[int, ...], Fraction]
 Factor = tuple[tuple[tuple[int, ...], Fraction], ...]
 #: An entry: a coefficient, and what to multiply it with.
 Entry = tuple[Fraction, tuple[Factor, ...]]
-#: Polynomials with more terms are left to numbers.
-_MOST_TERMS = 40
+#: Polynomials with more terms are left to numbers; on the way, before their terms cancel, they may have more.
+_MOST_TERMS, _MOST_ON_THE_WAY = 40, 400
 
 
 class ExactKrylov:
@@ -35,12 +35,15 @@ class ExactKrylov:
     ) -> None:
         self._columns = columns
         self._form = form
-        self._done: dict[tuple[int, int], dict[int, Polynomial]] = {(0, 0): {j: {(): Fraction(1)}}}
+        self._done: dict[tuple[int, int], dict[int, Polynomial] | None] = {(0, 0): {j: {(): Fraction(1)}}}
 
     def factors(self, power: int, s: int) -> dict[int, Entry] | None:
         """Row -> entry, without the rows that vanish."""
         entries = {}
-        for row, polynomial in self._vector(power, s).items():
+        vector = self._vector(power, s)
+        if vector is None:
+            return None
+        for row, polynomial in vector.items():
             found = _factored(polynomial)
             if found is None:
                 return None
@@ -52,20 +55,32 @@ class ExactKrylov:
             for row, (scale, factors) in entries.items()
         }
 
-    def _vector(self, power: int, s: int) -> dict[int, Polynomial]:
+    def _vector(self, power: int, s: int) -> dict[int, Polynomial] | None:
+        """Row -> polynomial; None where these grow too long, as in a basis without zeros."""
         if (power, s) not in self._done:
-            if s:
-                found = {row: dict(p) for row, p in self._vector(power + 2, s - 1).items()}
-                for row, p in self._vector(power, s - 1).items():
-                    _add_product(found.setdefault(row, {}), p, self._form)
-            else:
-                found = {}
-                for column, p in self._vector(power - 1, 0).items():
-                    for row, entry in self._columns[column].items():
-                        _add_product(found.setdefault(row, {}), p, {(i,): value for i, value in entry.items()})
-            left = {row: {key: value for key, value in p.items() if value} for row, p in found.items()}
-            self._done[power, s] = {row: p for row, p in left.items() if p}
+            self._done[power, s] = self._product(power, s)
         return self._done[power, s]
+
+    def _product(self, power: int, s: int) -> dict[int, Polynomial] | None:
+        below = self._vector(power, s - 1) if s else self._vector(power - 1, 0)
+        start = self._vector(power + 2, s - 1) if s else {}
+        if below is None or start is None:
+            return None
+        found = {row: dict(p) for row, p in start.items()}
+        for column, p in below.items():
+            by_row = (
+                {column: self._form} if s else {row: _linear(entry) for row, entry in self._columns[column].items()}
+            )
+            for row, factor in by_row.items():
+                _add_product(found.setdefault(row, {}), p, factor)
+                if len(found[row]) > _MOST_ON_THE_WAY:
+                    return None
+        left = {row: {key: value for key, value in p.items() if value} for row, p in found.items()}
+        return {row: p for row, p in left.items() if p}
+
+
+def _linear(entry: Mapping[int, Fraction]) -> Polynomial:
+    return {(i,): value for i, value in entry.items()}
 
 
 def _add_product(total: Polynomial, a: Polynomial, b: Mapping[tuple[int, ...], Fraction]) -> None:
