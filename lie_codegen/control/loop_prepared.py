@@ -118,7 +118,7 @@ def _known(value: Any) -> Hashable:
     kind = type(value)
     if kind is np.ndarray:
         if value.nbytes <= _BYTES and value.dtype.kind in "fiub":
-            return value.shape, value.dtype.str, value.tobytes()
+            return value.shape, value.dtype, value.tobytes()
     elif value is None or kind is float or kind is int or kind is bool:
         return kind, value
     if kind is str and not value.endswith(".toml") and value != "-":

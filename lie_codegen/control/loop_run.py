@@ -216,6 +216,7 @@ def _of_first_order(loop: Loop, errors: list[float]) -> bool:
 #: What a loop without noise draws.
 _NOTHING = np.zeros(0, dtype=np.uint32)
 _NOTHING.flags.writeable = False
+SILENT = NoiseStream(0, _NOTHING, 0)
 
 
 def noise_stream(loop: Loop, seed: int, first: int) -> NoiseStream:

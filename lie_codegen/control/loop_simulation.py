@@ -15,7 +15,7 @@ from lie_codegen.control.loop_origin import narrower, run_in_steps
 from lie_codegen.control.loop_prepared import Prepared
 from lie_codegen.control.loop_readout import result_of
 from lie_codegen.control.loop_result import ClosedLoop
-from lie_codegen.control.loop_run import Run, noise_stream, refined
+from lie_codegen.control.loop_run import SILENT, Run, noise_stream, refined
 from lie_codegen.control.loop_states import initial_own
 from lie_codegen.control.reference_check import check_once
 from lie_codegen.errors import InputError
@@ -84,7 +84,9 @@ def _run(
     start, many = several(start, many, loop.loops, runs)
     if states or model.own_ports:
         start = initial_own(model, start, {**told.start, **states})
-    stream = noise_stream(model, _whole(seed, "seed", 0), _whole(first, "first", 0))
+    stream = SILENT
+    if model.noise or seed is not None or type(first) is not int or first:
+        stream = noise_stream(model, _whole(seed, "seed", 0), _whole(first, "first", 0))
     sample = told.sample or 0.0
     return Run(
         model, library, start, many, told.times.copy(), loop.numbers, threads, sample, told.delay, stream, loop.system

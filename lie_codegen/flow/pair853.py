@@ -93,6 +93,8 @@ class PairRun(NamedTuple):
 
     def estimated(self, error: float) -> PairRun:
         """The same with this estimate of its error."""
+        if error == self.error_estimate:
+            return self
         return PairRun(self.X, self.y, self.steps, self.rejected, self.evaluations, error, self.left, self.knots)
 
     def within(self, system: System, knots: NDArray[np.intp], parts: Array) -> tuple[Array, Array]:
@@ -161,8 +163,6 @@ def _to_tolerance(
 
     Of several members, which are a pilot, that with which others like them are good enough, with the error that is then allowed for.
     """
-    # The error of a run is in proportion to its local tolerance: of two whose tolerances differ by a factor r the
-    # better errs by about their difference over r - 1. Twice that is reported, for proportion is not exact.
     one = len(X0) == 1
     free = one and system.is_interpolated and len(times) > 2  # steps go as they like, and all times cost little
     share = (_FREE_SHARE if system.lift is None else _FREE_SHARE_SHORT) if free else 1.0
@@ -176,21 +176,19 @@ def _to_tolerance(
         if free:  # where the reach limits steps two runs would be the same
             shorter *= _SHORTER
         if found is not None:
-            fine, difference, size, steps = found
+            fine, size, estimate = found
             found = None
         elif coarse is not None:
-            fine, steps = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where), coarse.steps
-            difference, size = _difference(system, fine, coarse, times, free), max(_size(fine.X), _size(fine.y))
-        scale = max(1.0, size)
-        # errors go as the eighth power of the steps: where these hardly became shorter, the tolerances promise too much
-        ratio = min(_RATIO, max((fine.steps / steps) ** 8, 2.0)) if free else _RATIO
-        estimate = 2 * difference / (ratio - 1) + fine.left
+            fine = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where)
+            size = max(_size(fine.X), _size(fine.y))
+            estimate = _estimate(_difference(system, fine, coarse, times, free), fine.left, fine.steps, coarse.steps, free)
+        scale = size if size > 1 else 1.0
         # Rounding: no run of so many steps knows its states better.
         floor = 1e-15 * scale * sqrt(fine.steps / len(X0))
         goal = max(rtol * scale, atol, floor)
         if estimate <= goal:
             if one:
-                return fine.estimated(max(estimate, floor)), share
+                return fine.estimated(estimate if estimate > floor else floor), share
             slack = min(max(goal / (_MARGIN * max(estimate, floor)), 1 / _MARGIN), _RATIO)
             return fine.estimated(max(_MARGIN * slack * estimate, floor)), slack * share
         local = _local(rtol, atol, share)
@@ -205,6 +203,17 @@ def _to_tolerance(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
     )
+
+
+def _estimate(difference: float, left: float, steps: int, coarse: float, free: bool) -> float:
+    """The error of the better of two runs.
+
+    It is in proportion to the local tolerance: of two whose tolerances differ by a factor r the better errs by about their difference over
+    r - 1. Twice that is reported, for proportion is not exact. Where steps go as they like errors go as the eighth power of these: where
+    they hardly became shorter, the tolerances promise too much.
+    """
+    ratio = min(_RATIO, max((steps / coarse) ** 8, 2.0)) if free else _RATIO
+    return 2 * difference / (ratio - 1) + left
 
 
 def _difference(system: System, fine: PairRun, coarse: PairRun, times: Array, free: bool) -> float:
@@ -314,11 +323,11 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
 
 def _twice(
     system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: float, share: float, free: bool
-) -> tuple[PairRun, float, float, int] | None:
+) -> tuple[PairRun, float, float] | None:
     """One member at two tolerances, that share of what is asked for and less, in one call; `free` as in `_to_tolerance`.
 
     Returns:
-        The second run, its largest difference to the first, its size, the steps of the first; None where one of them needs more
+        The second run, its size, an estimate of its error; None where one of them needs more
         than the first room for knots and one to each time at which steps end, or fails: `_once` says how.
     """
     steps = _FIRST_STEPS + (0 if free else len(times))
@@ -363,7 +372,7 @@ class _Room:
         lead = -(block.ctypes.data // 8 + places[first]) % _LINE  # slopes of a stage begin with a line of memory
         block = block[lead:]
         parts = [block[a:b] for a, b in pairwise(places[: first + 1])]
-        self.shape, self._goal = (k, steps), (0.0, 0.0, 0.0)
+        self.shape, self._goal, self._free = (k, steps), (0.0, 0.0, 0.0), free
         self._X0, self._y0, self._found, self._times, X, y, _, self._knots = parts
         self._X, self._y, self._width = X.reshape(k, 1, packed), y.reshape(k, 1, size), width
         self._pair, self._both, at = system.record(), Twice(), [block.ctypes.data + 8 * place for place in places]
@@ -381,7 +390,7 @@ class _Room:
 
     def run(
         self, X0: Array, y0: Array, times: Array, goal: tuple[float, float, float]
-    ) -> tuple[PairRun, float, float, int] | None:
+    ) -> tuple[PairRun, float, float] | None:
         """Both runs from one state; arguments and result as of `_twice`."""
         self._X0[:], self._y0[:], self._times[:] = X0[0], y0[0], times
         if goal != self._goal:
@@ -389,11 +398,12 @@ class _Room:
             self._both.tolerance[:] = *_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO)
         if self._call(self._address) != DONE:
             return None
-        off, largest, coarse, counted, rejected, evaluations, left = self._found.tolist()
+        difference, size, coarse, counted, rejected, evaluations, left = self._found.tolist()
         steps = int(counted)
+        estimate = _estimate(difference, left, steps, coarse, self._free)
         knots = self._knots[: steps * self._width].reshape(steps, self._width).copy()
-        run = PairRun(self._X.copy(), self._y.copy(), steps, int(rejected), int(evaluations), nan, left, knots)
-        return run, off, largest, int(coarse)
+        run = PairRun(self._X.copy(), self._y.copy(), steps, int(rejected), int(evaluations), estimate, left, knots)
+        return run, size, estimate
 
 
 def _between(system: System) -> float:

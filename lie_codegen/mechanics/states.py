@@ -28,9 +28,10 @@ def initial_states(group: MatrixGroup, X0: ArrayLike | None, xi0: ArrayLike | No
     xi = np.zeros(n) if xi0 is None else np.asarray(xi0, dtype=float)
     if X.shape == (d, d) and xi.shape == (n,):
         packed = packed_by(form, X if X is identity else admitted(group, X, "X0").X)
-        state = np.empty((1, len(packed) + n))
-        state[0, : len(packed)], state[0, len(packed) :] = packed, xi
-        return state, False
+        size = len(packed)
+        state = np.empty(size + n)
+        state[:size], state[size:] = packed, xi
+        return state[None], False
     if X.shape[-2:] != (d, d) or X.ndim not in (2, 3) or xi.shape[-1:] != (n,) or xi.ndim not in (1, 2):
         raise ShapeError(
             f"initial states on {group.name}: X0 {X.shape} and xi0 {xi.shape}; give ({d}, {d}) and ({n},), or N of either: (N, {d}, {d}), (N, {n})"

@@ -80,10 +80,10 @@ def admitted_all(group: MatrixGroup, X: Array, where: str) -> tuple[Array, Array
 
 
 def _matrix(group: MatrixGroup, X: ArrayLike, where: str) -> Array:
-    d, dtype = group.degree, group.basis.dtype
+    d, dtype = group.basis.shape[1], group.basis.dtype
     try:
         given = np.asarray(X)
-        if given.dtype.kind == "c" and dtype.kind != "c":
+        if given.dtype is not dtype and given.dtype.kind == "c" and dtype.kind != "c":
             if np.any(given.imag != 0):
                 raise ShapeError(f"{where}: complex entries, but {group.name} is a group of real matrices")
             given = given.real

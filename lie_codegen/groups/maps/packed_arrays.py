@@ -50,7 +50,8 @@ def packed_elements(group: MatrixGroup, X: Array) -> Array:
 
 def packed_by(form: Form, X: Array) -> Array:
     """The same by a form."""
-    entries = np.ascontiguousarray(X, dtype=form.dtype).reshape(*X.shape[:-2], -1)
+    entries = np.ascontiguousarray(X, dtype=form.dtype)
+    entries = entries.reshape(-1) if entries.ndim == 2 else entries.reshape(*X.shape[:-2], -1)
     if form.places is not None:
         entries = entries.take(form.places, axis=-1)
     return entries if entries.dtype.kind == "f" else entries.view(float)
