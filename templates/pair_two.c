@@ -35,15 +35,16 @@ LCG_INLINE lcg_v of_both(double one, double two)
     return both;
 }
 
-LCG_INLINE void weighed(const double *weight, int s, const lcg_v k[][PAIR_SIZE], lcg_v *sum)
+/* sum + scale sum_j weight_j k_j. */
+LCG_INLINE void add_weighed(const double *weight, int s, const lcg_v k[][PAIR_SIZE], lcg_v scale, lcg_v *sum)
 {
     lcg_v all[PAIR_SIZE];
     UNROLLED
     for (int i = 0; i < PAIR_SIZE; ++i) {
-        all[i] = lcg_splat(0.0);
+        all[i] = sum[i];
     }
     for (int u = 0; u < USES[s]; ++u) { /* stage after stage: the newest, which is waited for, comes last */
-        const lcg_v a = lcg_splat(weight[USED[s][u]]), *from = k[USED[s][u]];
+        const lcg_v a = scale * weight[USED[s][u]], *from = k[USED[s][u]];
         UNROLLED
         for (int i = 0; i < PAIR_SIZE; ++i) {
             all[i] += a * from[i];
@@ -69,8 +70,12 @@ LCG_INLINE void errors(const Half *of, const lcg_v *y, const lcg_v *after, const
 {
     const lcg_v rtol = of_both(of[0].rtol, of[1].rtol), atol = of_both(of[0].atol, of[1].atol), one = lcg_splat(1.0);
     lcg_v e5[PAIR_SIZE], e3[PAIR_SIZE], five = lcg_splat(0.0), three = five, angle = five;
-    weighed(E5, STAGES, k, e5);
-    weighed(E3, STAGES, k, e3);
+    UNROLLED
+    for (int i = 0; i < PAIR_SIZE; ++i) {
+        e5[i] = e3[i] = five;
+    }
+    add_weighed(E5, STAGES, k, one, e5);
+    add_weighed(E3, STAGES, k, one, e3);
     UNROLLED
     for (int i = 0; i < PAIR_SIZE; ++i) {
         const lcg_v a = lcg_fabs(y[i]), b = lcg_fabs(after[i]);
@@ -105,26 +110,19 @@ void pair_two(const Half *of, const double *const *number)
         X[i] = of_both(of[0].X[i], of[1].X[i]);
     }
     for (int i = 0; i < PAIR_SIZE; ++i) {
-        y[i] = stage[i] = of_both(of[0].y[i], of[1].y[i]);
+        y[i] = of_both(of[0].y[i], of[1].y[i]);
     }
     (void)X;
     (void)n;
     for (int s = 0; s < STAGES; ++s) {
         const lcg_v now = t + C[s] * h;
-        if (s) {
-            weighed(A[s], s, k, stage);
-            UNROLLED
-            for (int i = 0; i < PAIR_SIZE; ++i) {
-                stage[i] = y[i] + h * stage[i];
-            }
-        }
+        memcpy(stage, y, sizeof stage);
+        add_weighed(A[s], s, k, h, stage);
         PAIR_RATE(X, stage, &now, n, k[s]);
     }
     give(k[0], of[0].slope, of[1].slope);
-    weighed(B, STAGES, k, stage);
-    for (int i = 0; i < PAIR_SIZE; ++i) {
-        stage[i] = y[i] + h * stage[i];
-    }
+    memcpy(stage, y, sizeof stage);
+    add_weighed(B, STAGES, k, h, stage);
     give(stage, of[0].after, of[1].after);
     errors(of, y, stage, k);
 }

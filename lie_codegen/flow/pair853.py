@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from itertools import accumulate, pairwise
-from math import nan, sqrt
+from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -181,7 +181,9 @@ def _to_tolerance(
         elif coarse is not None:
             fine = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where)
             size = max(_size(fine.X), _size(fine.y))
-            estimate = _estimate(_difference(system, fine, coarse, times, free), fine.left, fine.steps, coarse.steps, free)
+            estimate = _estimate(
+                _difference(system, fine, coarse, times, free), fine.left, fine.steps, coarse.steps, free
+            )
         scale = size if size > 1 else 1.0
         # Rounding: no run of so many steps knows its states better.
         floor = 1e-15 * scale * sqrt(fine.steps / len(X0))
@@ -199,6 +201,8 @@ def _to_tolerance(
             share /= min(needed / _RATIO, 1e4)
             fine = _once(system.within(shorter), X0, y0, times, *_local(rtol, atol, share), where)
         coarse = fine
+        if one and system.reach == inf:  # over lanes the first of two runs costs nothing, though it was there already
+            found = _twice(system, X0, y0, times, rtol, atol, share, free)
     raise ComputationError(
         f"{where}: local errors of {local[1]:.2g} leave an error of {estimate:.2g} at the times that were asked for; the motion is too "
         "sensitive for the tolerance: loosen rtol or shorten the time"
@@ -275,6 +279,7 @@ def _one(system: System, X0: Array, y0: Array, times: Array, rtol: float, atol: 
     # a system that can be interpolated steps to its end, and the states between come afterwards
     between = system.is_interpolated and k > 2
     given = system.record()
+    given.both = system.both
     X_out, y_out = np.empty((k, 1, packed)), np.empty((k, 1, size))
     X_out[0], y_out[0] = X0, y0
     # one block of memory: the state, which is read in whole eights, the times behind the first, what steps and interpolation work with
@@ -328,9 +333,9 @@ def _twice(
 
     Returns:
         The second run, its size, an estimate of its error; None where one of them needs more
-        than the first room for knots and one to each time at which steps end, or fails: `_once` says how.
+        than half the steps of a call and one to each time at which steps end, or fails: `_once` says how.
     """
-    steps = _FIRST_STEPS + (0 if free else len(times))
+    steps = _STEPS // 2 + (0 if free else len(times))
     if steps > _STEPS:
         return None
     try:
