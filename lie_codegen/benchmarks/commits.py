@@ -2,13 +2,16 @@
 
 Both checkouts run in processes of their own and are timed A, B, B, A, ..., a few milliseconds each, so that what else the machine does
 meets both alike; of each process the least time counts, since nothing makes a program faster than it is. How a process lies in memory is
-luck of its own: so there are several pairs of processes, and a row is slower only where it is in every pair.
+luck of its own, and the length of its environment, which moves the stack, is part of it (Mytkowicz et al. 2009): the same machine code took 1.08 of
+its time in all pairs of one run and .89 in another. So there are several pairs of processes, each with an environment of a length of its own, and
+a row is slower only where it is in every pair.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import random
 import subprocess
 import sys
 import tarfile
@@ -76,9 +79,10 @@ def bench_commits(
         InputError: neither a checkout nor a commit; no row has the text.
     """
     seen: dict[str, list[CommitRow]] = {}
+    lengths = random.Random(against)
     with _checkout(against) as folder:
         for pair in range(pairs):
-            sides = [_Side(root, only) for root in (_ROOT, folder)]
+            sides = [_Side(root, only, lengths.randrange(4096)) for root in (_ROOT, folder)]
             try:
                 if not sides[0].rows:
                     raise InputError(f"bench --against: no row has {only!r} in its name; see commit_rows.py")
@@ -124,8 +128,9 @@ def _checkout(against: str) -> Iterator[Path]:
 class _Side:
     """A process with one of the checkouts."""
 
-    def __init__(self, root: Path, only: str) -> None:
+    def __init__(self, root: Path, only: str, padding: int) -> None:
         environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment["LIE_CODEGEN_BENCH_PADDING"] = "-" * padding
         for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
             environment[threads] = "1"
         self._process = subprocess.Popen(
