@@ -71,11 +71,11 @@ def settle(record: Any, **kept: Any) -> None:
         object.__setattr__(record, name, value)
 
 
-def made_of(kind: type[Record], **kept: Any) -> Record:
+def made_of(kind: type[Record], kept: dict[str, Any]) -> Record:
     """A frozen record of all its fields, each in the form in which it is kept, and of what stands beside them: what its constructor makes, in a
-    third of the time, which counts where a whole call takes some ten microseconds."""
+    quarter of the time, which counts where a whole call takes some ten microseconds. The record takes the dict as it is."""
     record = object.__new__(kind)
-    vars(record).update(kept)
+    object.__setattr__(record, "__dict__", kept)
     return record
 
 

@@ -141,9 +141,13 @@ typedef double Quad;
 #define UNROLLED
 #endif
 
+/* Where 1/(x_k - x_j) of j < k stands among all. */
+#define PAST(k, j) ((k) * ((k) - 1) / 2 + (j))
+enum { PASTS = 16 };
+
 /* Of MANY entries from the first on: the coefficients, and the value at a place `away` from each of the knots. */
 #define HERMITE(MANY, TYPE)                                                                         \
-    static inline void hermite_##MANY(const Hermite *p, ptrdiff_t n, double over[KNOTS][KNOTS], double h, ptrdiff_t first) \
+    static inline void hermite_##MANY(const Hermite *p, ptrdiff_t n, const double *over, double h, ptrdiff_t first) \
     {                                                                                               \
         enum { PARTS = MANY * sizeof(double) / sizeof(TYPE) };                                      \
         int i, j, l;                                                                                \
@@ -157,7 +161,7 @@ typedef double Quad;
             for (j = 1; j < NODES; ++j) {                                                           \
                 UNROLLED                                                                            \
                 for (i = NODES - 1; i >= j; --i) { /* two nodes that follow each other may be one place */ \
-                    c[i] = j == 1 && i % 2 ? h * ((const TYPE *)(p->slope[i / 2] + first))[l] : over[i / 2][(i - j) / 2] * (c[i] - c[i - 1]); \
+                    c[i] = j == 1 && i % 2 ? h * ((const TYPE *)(p->slope[i / 2] + first))[l] : over[PAST(i / 2, (i - j) / 2)] * (c[i] - c[i - 1]); \
                 }                                                                                   \
             }                                                                                       \
             UNROLLED                                                                                \
@@ -188,12 +192,19 @@ HERMITE(4, Quad)
 /* What `hermite_at` needs of places, values and slopes: four entries at a time, the last four perhaps again. */
 static APART void hermite(const Hermite *p, ptrdiff_t n, double h)
 {
-    double over[KNOTS][KNOTS];
+    double over[PASTS];
     ptrdiff_t i = 0;
-    for (int k = 0; k < KNOTS; ++k) { /* all, the zeros between too: so they are divided several at once */
-        for (int j = 0; j < KNOTS; ++j) {
-            over[k][j] = 1.0 / (p->place[k] - p->place[j]);
+    over[PASTS - 1] = 1.0;
+    UNROLLED
+    for (int k = 1; k < KNOTS; ++k) {
+        UNROLLED
+        for (int j = 0; j < k; ++j) {
+            over[PAST(k, j)] = p->place[k] - p->place[j];
         }
+    }
+    for (int l = 0; l < (int)(PASTS * sizeof(double) / sizeof(Quad)); ++l) { /* four at a time */
+        Quad *some = (Quad *)over + l;
+        *some = 1.0 / *some;
     }
     for (; i + FOUR <= n; i += FOUR) {
         hermite_4(p, n, over, h, i);

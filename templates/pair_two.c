@@ -94,6 +94,9 @@ LCG_INLINE void errors(const Half *of, const lcg_v *y, const lcg_v *after, const
     }
 }
 
+#if defined(__GNUC__) && !defined(__clang__)
+__attribute__((externally_visible)) /* -fwhole-program: what nobody calls is not compiled */
+#endif
 void pair_two(const Half *of, const double *const *number);
 void pair_two(const Half *of, const double *const *number)
 {

@@ -82,8 +82,10 @@ def motion_of(run: Run, pair: PairRun) -> tuple[Array, Array]:
     plant = run.loop.plant
     if run.loop.own_ports or not isinstance(plant, GroupPlant):
         return plant.split(states_of(run, pair))
-    X, y = (pair.X, pair.y) if run.many else (pair.X[:, 0], pair.y[:, 0])
-    return elements_of(plant.group, X), copied(y[..., y.shape[-1] - plant.sizes[1] :])
+    first = pair.y.shape[2] - plant.sizes[1]
+    if run.many:
+        return elements_of(plant.group, pair.X), copied(pair.y[:, :, first:])
+    return elements_of(plant.group, pair.X[:, 0]), copied(pair.y[:, 0, first:])
 
 
 def _parted(loop: Loop, states: Array) -> tuple[Array, Array]:

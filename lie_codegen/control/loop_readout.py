@@ -53,9 +53,13 @@ def result_of(
         xi = xi if u is None else u
     kind = told.kind if pair is None else "adaptive"
     return made_of(
-        ClosedLoop, t=times, X=X, xi=xi, outputs=Later(said.outputs), X_d=moves.get("X_d"), xi_d=moves.get("xi_d"), steps=steps,
-        error_estimate=error, u=Later(said.command), states=said.states if loop.own_ports else {},
-        group=getattr(loop.plant, "group", None), events=events, origin=Later(partial(loop_origin, making, kind)), _made=making,
+        ClosedLoop,
+        {
+            "t": times, "X": X, "xi": xi, "outputs": Later(said.outputs), "X_d": moves.get("X_d"), "xi_d": moves.get("xi_d"),
+            "steps": steps, "error_estimate": error, "u": Later(said.command), "states": said.states if loop.own_ports else {},
+            "group": getattr(loop.plant, "group", None), "events": events, "origin": Later(partial(loop_origin, making, kind)),
+            "_made": making,
+        },
     )  # fmt: skip
 
 

@@ -335,17 +335,21 @@ def _twice(
         The second run, its size, an estimate of its error; None where one of them needs more
         than half the steps of a call and one to each time at which steps end, or fails: `_once` says how.
     """
-    steps = _STEPS // 2 + (0 if free else len(times))
-    if steps > _STEPS:
+    ends = 0 if free else len(times)
+    sizes = _FIRST_STEPS + ends, _STEPS // 2 + ends
+    if sizes[0] > _STEPS:
         return None
     try:
         room: _Room = system.idle.pop()  # pop and append are atomic: nobody else uses it
-        if room.shape != (len(times), steps):
+        if room.times != len(times) or room.steps not in sizes:
             raise IndexError
     except IndexError:
-        room = _Room(system, len(times), steps, free)
-    found = room.run(X0, y0, times, (rtol, atol, share))
-    if room.shape[0] <= _MOST_TIMES_KEPT:
+        room = _Room(system, len(times), sizes[0], free)
+    status, found = room.run(X0, y0, times, (rtol, atol, share))
+    if status == FULL and sizes[0] == room.steps < sizes[1]:
+        room = _Room(system, len(times), sizes[1], free)
+        _, found = room.run(X0, y0, times, (rtol, atol, share))
+    if room.times <= _MOST_TIMES_KEPT:
         system.idle.append(room)
     return found
 
@@ -377,9 +381,9 @@ class _Room:
         lead = -(block.ctypes.data // 8 + places[first]) % _LINE  # slopes of a stage begin with a line of memory
         block = block[lead:]
         parts = [block[a:b] for a, b in pairwise(places[: first + 1])]
-        self.shape, self._goal, self._free = (k, steps), (0.0, 0.0, 0.0), free
-        self._X0, self._y0, self._found, self._times, X, y, _, self._knots = parts
-        self._X, self._y, self._width = X.reshape(k, 1, packed), y.reshape(k, 1, size), width
+        self.times, self.steps, self._goal, self._free = k, steps, (0.0, 0.0, 0.0), free
+        self._X0, self._y0, self._found, self._times, X, y, _, knots = parts
+        self._X, self._y, self._knots = X.reshape(k, 1, packed), y.reshape(k, 1, size), knots.reshape(rows, width)
         self._pair, self._both, at = system.record(), Twice(), [block.ctypes.data + 8 * place for place in places]
         pair, both = self._pair, self._both
         both.start, _, both.found, pair.times, pair.X_out, pair.y_out, both.other, both.knots = at[:first]
@@ -395,20 +399,21 @@ class _Room:
 
     def run(
         self, X0: Array, y0: Array, times: Array, goal: tuple[float, float, float]
-    ) -> tuple[PairRun, float, float] | None:
-        """Both runs from one state; arguments and result as of `_twice`."""
-        self._X0[:], self._y0[:], self._times[:] = X0[0], y0[0], times
+    ) -> tuple[int, tuple[PairRun, float, float] | None]:
+        """Both runs from one state: how they ended, and what `_twice` returns."""
+        self._X0[:], self._y0[:], self._times[:] = X0, y0, times
         if goal != self._goal:
             rtol, atol, share = self._goal = goal
             self._both.tolerance[:] = *_local(rtol, atol, share), *_local(rtol, atol, share / _RATIO)
-        if self._call(self._address) != DONE:
-            return None
+        status = int(self._call(self._address))
+        if status != DONE:
+            return status, None
         difference, size, coarse, counted, rejected, evaluations, left = self._found.tolist()
         steps = int(counted)
         estimate = _estimate(difference, left, steps, coarse, self._free)
-        knots = self._knots[: steps * self._width].reshape(steps, self._width).copy()
-        run = PairRun(self._X.copy(), self._y.copy(), steps, int(rejected), int(evaluations), estimate, left, knots)
-        return run, size, estimate
+        X, y, knots = self._X.copy(), self._y.copy(), self._knots[:steps].copy()
+        run = PairRun(X, y, steps, int(rejected), int(evaluations), estimate, left, knots)
+        return DONE, (run, size, estimate)
 
 
 def _between(system: System) -> float:

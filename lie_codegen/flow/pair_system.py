@@ -138,6 +138,7 @@ class System:
         inputs = [*(["X"] if self.lift is None else []), "y", "t", *(f"(n) + {place}" for place in offsets[:-1])]
         flags = (
             f"-DPAIR_RATE(X,y,t,n,rate)={self.rate.signature.symbol}_lanes({','.join(inputs)},rate)",
+            "-fwhole-program",
             f"-DPAIR_SIZE={self.size}",
             f"-DPAIR_PACKED={self.kept}",
             f"-DPAIR_TURNS={self.turns}",

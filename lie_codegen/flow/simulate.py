@@ -160,9 +160,12 @@ def simulate(
 
         hits = run_events(group, drive, times, start, tuple(events), asked, order, run.longest)
     return made_of(
-        Trajectory, group=group, t=times, X=X, steps=run.steps, error_estimate=run.error_estimate,
-        method=method if method in FOURTH_ORDER else f"magnus{order}", evaluations=drive.evaluations, resolution=drive.resolution,
-        events=hits, drive=drive, rtol=goal, multiple=run.multiple,
+        Trajectory,
+        {
+            "group": group, "t": times, "X": X, "steps": run.steps, "error_estimate": run.error_estimate,
+            "method": method if method in FOURTH_ORDER else f"magnus{order}", "evaluations": drive.evaluations,
+            "resolution": drive.resolution, "events": hits, "drive": drive, "rtol": goal, "multiple": run.multiple,
+        },
     )  # fmt: skip
 
 

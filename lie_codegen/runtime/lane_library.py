@@ -52,12 +52,15 @@ class LaneLibrary:
             return self._blocks[symbol]
 
     def beside(self, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
-        """A library of the file `main`, which includes PAIR_SOURCE, the sources of this one; None where it cannot be had."""
-        key = digest(["beside", self._entry.library.parent.name, main, dict(more_files), *more_flags])
+        """A library of the file `main`, which includes PAIR_SOURCE, the sources of this one; None where it cannot be had.
+
+        Its name and the flags say which: of one name the files are always the same.
+        """
+        known = " ".join((main, *more_flags))
         with self._lock:
-            if key not in self._blocks:
-                self._blocks[key] = self._opened_at(lambda: self._beside(key, main, more_files, more_flags))
-            return self._blocks[key]
+            if known not in self._blocks:
+                self._blocks[known] = self._opened_at(lambda: self._beside(main, more_files, more_flags))
+            return self._blocks[known]
 
     def _library(self, more_flags: tuple[str, ...]) -> ctypes.CDLL | None:
         return self._opened_at(lambda: self._find_or_compile(more_flags))
@@ -73,7 +76,8 @@ class LaneLibrary:
         """Samples at a time."""
         return int(self.open()[f"{self._entry.namespace}_lie_codegen_lanes"]())
 
-    def _beside(self, key: str, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> Path:
+    def _beside(self, main: str, more_files: Mapping[str, str], more_flags: tuple[str, ...]) -> Path:
+        key = digest(["beside", self._entry.library.parent.name, main, dict(more_files), *more_flags])
         entry = cache.find_entry(self._folder, key)
         if entry is not None:  # without the sources, which take a millisecond to read
             return entry.library

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
+
 from lie_codegen.codegen.templates import template_folder
 from lie_codegen.runtime import dop853
 
@@ -16,9 +20,12 @@ def group_headers() -> dict[str, str]:
     return {**pair_headers(), "pair_control.h": _template("pair_control.h")}
 
 
-def two_files() -> dict[str, str]:
+@cache
+def two_files() -> Mapping[str, str]:
     """The step of two runs of one system, which is compiled for its rate: the main file first."""
-    return {"pair_two.c": _template("pair_two.c"), "pair_two.h": _template("pair_two.h"), "ode_table.h": _step_table()}
+    return MappingProxyType(
+        {**{name: _template(name) for name in ("pair_two.c", "pair_two.h")}, "ode_table.h": _step_table()}
+    )
 
 
 def dense_headers() -> dict[str, str]:
