@@ -64,6 +64,14 @@ class MatrixExponential:
         """The largest modulus of an eigenvalue: the inverse of the natural scale of x."""
         return max((float(abs(complex(mode.rate + sp.I * mode.frequency))) for mode in self.modes), default=0.0)
 
+    def is_one(self, place: tuple[int, int]) -> bool:
+        """Whether an entry is 1 for every x."""
+        row = self.entries[place]
+        constant = all(
+            self.modes[m].power == 0 and self.modes[m].rate == 0 and self.modes[m].frequency == 0 for m in row
+        )
+        return constant and list(row.values()) == [1]
+
     @cached_property
     def reflected(self) -> MatrixExponential:
         """exp(-x A) by functions of x."""

@@ -49,3 +49,21 @@ def test_jacobians_of_screws(name: str) -> None:
     (J,) = kernel.evaluate(FloatArithmetic(), x.tolist())
     wanted = scipy.linalg.expm(ad)[:n, n:]
     assert np.max(np.abs(np.array(J, dtype=float) - wanted)) < 1e-13 * np.max(np.abs(wanted))
+
+
+@pytest.mark.parametrize("name", ["sl3", "sp4"])
+def test_wei_norman_where_adjoint_spectra_are_involved(name: str) -> None:
+    """The roots of ad_k span fields of degree 6 and 16: Sp(4) and SO(5) were refused, SU(3) took minutes."""
+    group = generic_basis(lc.group(name), np.random.default_rng(1))
+    (kernel,) = [kernel for kernel in lc.group_kernels(group) if kernel.name == "wei_norman_rate"]
+    rng, n = np.random.default_rng(3), group.dim
+    g, u = rng.normal(size=n) / 20, rng.normal(size=n)
+    ads = np.zeros((n, n, n))
+    for i, j, k, value in group.algebra.constants():
+        ads[i, k, j] += float(value)
+    columns, after = np.zeros((n, n)), np.eye(n)
+    for k in reversed(range(n)):
+        columns[:, k] = after[:, k]
+        after = after @ scipy.linalg.expm(-g[k] * ads[k])
+    (rate,) = kernel.evaluate(FloatArithmetic(), g.tolist(), u.tolist())
+    assert np.max(np.abs(columns @ np.array(rate, dtype=float) - u)) < 1e-12

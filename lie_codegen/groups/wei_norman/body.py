@@ -13,13 +13,15 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from lie_codegen.groups.wei_norman.conjugation import Conjugation
 from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
-from lie_codegen.groups.wei_norman.frames import Factors, Frames, times_vector
+from lie_codegen.groups.wei_norman.frames import Factors, Frames
+from lie_codegen.groups.wei_norman.products import times_matrix, times_vector
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
 from lie_codegen.kernel.block_solve import SparseMatrix
 from lie_codegen.kernel.complex_scalar import Complex
-from lie_codegen.kernel.structural_zeros import add, product
+from lie_codegen.kernel.structural_zeros import add
 
 
 def inverse_columns(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> SparseMatrix:
@@ -67,7 +69,9 @@ def _frames(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> Frames
 def _factors(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> Factors:
     @cache
     def factor(k: int, forward: bool) -> SparseMatrix:
-        exponential = data.adjoint[k]
+        exponential = data.turns[k]
+        if isinstance(exponential, Conjugation):
+            return exponential.values(ops, data.real, g[k], forward)
         return ExponentialEntries(ops, g[k], exponential if forward else exponential.reflected).sparse()
 
     return factor
@@ -80,23 +84,10 @@ def product_exp(ops: Arithmetic, data: WeiNormanData, g: Sequence[Scalar]) -> li
     product_: dict[tuple[int, int], Scalar] = {(i, i): 1 for i in range(columns)}
     for k in reversed(range(data.group.dim)):
         factor = ExponentialEntries(ops, g[k], data.defining[k]).sparse()
-        product_ = _times_matrix(factor, product_)
+        product_ = times_matrix(factor, product_)
     if not data.group.is_complex:
         return [[product_.get((i, j), 0) for j in range(columns)] for i in range(size)]
     return [
         [Complex(product_.get((i, j), 0), product_.get((i + columns, j), 0)) for j in range(columns)]
         for i in range(columns)
     ]
-
-
-def _times_matrix(
-    left: Mapping[tuple[int, int], Scalar], right: Mapping[tuple[int, int], Scalar]
-) -> dict[tuple[int, int], Scalar]:
-    rows: dict[int, list[tuple[int, Scalar]]] = {}
-    for (m, j), value in right.items():
-        rows.setdefault(m, []).append((j, value))
-    result: dict[tuple[int, int], Scalar] = {}
-    for (i, m), entry in left.items():
-        for j, value in rows.get(m, []):
-            result[i, j] = add(result.get((i, j), 0), product(entry, value))
-    return result

@@ -17,9 +17,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from lie_codegen.exact.exponential import MatrixExponential
+from lie_codegen.groups.wei_norman.conjugation import Conjugation
+from lie_codegen.groups.wei_norman.products import times_vector
 from lie_codegen.kernel.arithmetic import Scalar
 from lie_codegen.kernel.block_solve import SparseMatrix, blocks_of, solve
-from lie_codegen.kernel.structural_zeros import add, is_zero, product
+from lie_codegen.kernel.structural_zeros import is_zero, product
 
 #: (k, forward) -> exp(g_k ad_k) if forward, else exp(-g_k ad_k), sparse.
 Factors = Callable[[int, bool], SparseMatrix]
@@ -31,15 +33,6 @@ class Step:
 
     frame: int
     block: tuple[int, ...]
-
-
-def times_vector(matrix: SparseMatrix, vector: Mapping[int, Scalar]) -> dict[int, Scalar]:
-    """The sparse product of a matrix and a vector."""
-    result: dict[int, Scalar] = {}
-    for (i, j), entry in matrix.items():
-        if j in vector:
-            result[i] = add(result.get(i, 0), product(entry, vector[j]))
-    return result
 
 
 class Frames:
@@ -92,7 +85,7 @@ class Frames:
         return known
 
 
-def cheapest_steps(exponentials: Sequence[MatrixExponential]) -> tuple[Step, ...]:
+def cheapest_steps(exponentials: Sequence[MatrixExponential | Conjugation]) -> tuple[Step, ...]:
     """The order of solution that takes the fewest operations among those that prefer one frame each."""
     size = len(exponentials)
     patterns = [set(data.entries) for data in exponentials]
@@ -175,10 +168,12 @@ class _OperationCount:
         return _OperationCount(4, self, other)
 
 
-def _cost(exponentials: Sequence[MatrixExponential], steps: Sequence[Step]) -> int:
+def _cost(exponentials: Sequence[MatrixExponential | Conjugation], steps: Sequence[Step]) -> int:
     """Weighted operations to solve for one right-hand side; a division counts four."""
     size = len(exponentials)
-    factors = [{place: _leaf(data, place) for place in data.entries} for data in exponentials]
+    factors = [
+        {place: 1 if data.is_one(place) else _OperationCount() for place in data.entries} for data in exponentials
+    ]
     solution = Frames(lambda k, _: factors[k], size).solve(steps, {i: _OperationCount() for i in range(size)})
     seen: set[int] = set()
     stack = [value for value in solution.values() if isinstance(value, _OperationCount)]
@@ -190,11 +185,3 @@ def _cost(exponentials: Sequence[MatrixExponential], steps: Sequence[Step]) -> i
             total += node.weight
             stack.extend(node.parts)
     return total
-
-
-def _leaf(data: MatrixExponential, place: tuple[int, int]) -> Any:
-    constant = all(
-        mode.power == 0 and mode.rate == 0 and mode.frequency == 0
-        for mode in map(data.modes.__getitem__, data.entries[place])
-    )
-    return 1 if constant and list(data.entries[place].values()) == [1] else _OperationCount()

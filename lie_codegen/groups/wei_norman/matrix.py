@@ -18,7 +18,7 @@ from lie_codegen.groups.matrix_group import MatrixGroup
 from lie_codegen.groups.wei_norman.body import inverse_columns
 from lie_codegen.groups.wei_norman.data import WeiNormanData
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
-from lie_codegen.groups.wei_norman.frames import times_vector
+from lie_codegen.groups.wei_norman.products import times_vector
 from lie_codegen.groups.wei_norman.ring_factors import factors as factors_of
 from lie_codegen.groups.wei_norman.ring_fractions import quotient
 from lie_codegen.groups.wei_norman.ring_solve import combination, dense, determinant, inverse_rows
