@@ -42,8 +42,8 @@ _BETWEEN, _BETWEEN_SHORT = 2.0, 4.0
 _SMALLEST, _MOST_RUNS = 1e-15, 6
 #: Doubles of a line of memory: vectors that lie across two take longer.
 _LINE = 8
-#: Times up to which a system keeps the memory of a run: half a megabyte.
-_MOST_TIMES_KEPT = 4096
+#: Times up to which a system keeps the memory of a run, a third of a megabyte: beyond, what it costs to have it anew is little beside the run.
+_MOST_TIMES_KEPT = 1024
 #: Steps that are tried at most: some seconds.
 _MOST_STEPS = 2**21
 
