@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from lie_codegen.codegen.call_defaults import chosen_results, output_places
 from lie_codegen.codegen.lane_forms import CHOICE_FORMS, LANE_FORMS, MASK_FORMS, OF_MASKS, SLOW_FORMS
 from lie_codegen.codegen.opcodes import C99, Target
 from lie_codegen.codegen.reciprocals import with_shared_reciprocals
@@ -44,6 +45,56 @@ class LaneStatement:
         if not self.results:
             return f"const {self.type} {self.name} = {self.expression};"
         return f"{self.type} {self.name}[{self.results}]; {self.expression};"
+
+
+@dataclass(frozen=True)
+class LaneRoutine:
+    """A routine that is called on lanes: the type it computes in, its name, its numbers of inputs and outputs."""
+
+    type: str
+    name: str
+    inputs: int
+    outputs: int
+
+
+@dataclass(frozen=True)
+class LanePatch(LaneStatement):
+    """Numbers and entries of outputs, then what a routine leaves of them in the lanes where a condition holds.
+
+    Attributes:
+        routine: what is called.
+        condition: a mask.
+        arguments: values.
+        chosen: (what is declared or stored, whether it is declared, place among the results, value where nothing is called) each.
+        array: the output that all of these are entries of; empty where they are not.
+        places: for each result its entry of that output, or -1; empty if they are all of its first, in order.
+    """
+
+    routine: LaneRoutine = LaneRoutine("", "", 0, 0)
+    condition: str = ""
+    arguments: tuple[str, ...] = ()
+    chosen: tuple[tuple[str, bool, int, str], ...] = ()
+    array: str = ""
+    places: tuple[int, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """As C."""
+        given = [f"{f'{self.type} ' * declared}{name} = {value};" for name, declared, _, value in self.chosen]
+        inside = [
+            f"const lcg_m on = {self.condition};",
+            f"const lcg_v from[{self.routine.inputs}] = {{{', '.join(self.arguments)}}};",
+        ]
+        if not self.array:
+            inside += [f"lcg_v to[{self.routine.outputs}];", f"{self.routine.name}_on_lanes(from, &on, to, 0);"]
+            inside += [f"{name} = lcg_select(on, to[{entry}], {name});" for name, _, entry, _ in self.chosen]
+        elif self.places:
+            inside.append(f"static const short at[{len(self.places)}] = {{{', '.join(map(str, self.places))}}};")
+            inside.append(f"{self.routine.name}_on_lanes(from, &on, {self.array}, at);")
+        else:
+            inside.append(f"{self.routine.name}_on_lanes(from, &on, {self.array}, 0);")
+        some = f"if (__builtin_expect(lcg_some({self.condition}), 0)) {{"
+        return "\n    ".join([*given, some, *(f"    {line}" for line in inside), "}"])
 
 
 @dataclass(frozen=True)
@@ -101,6 +152,7 @@ class LaneBody:
             first in every port. Only for short bodies.
         past: whether the twins have a second loop, for results that go past the caches.
         light: whether each sample is a call instead where results stay in the caches; to the last bit the same.
+        patches: the routines of its patches.
     """
 
     statements: tuple[LaneStatement | LaneBlock, ...]
@@ -112,6 +164,7 @@ class LaneBody:
     twin: LaneBody | None = None
     past: bool = False
     light: bool = False
+    patches: tuple[LaneRoutine, ...] = ()
 
     @property
     def inline(self) -> bool:
@@ -157,7 +210,7 @@ def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBod
         body = _body(tape, target)
         if not body.inline:
             return body
-        numbers = sum(sizes) + len(body.stores)
+        numbers = sum(sizes) + sum(map(len, tape.outputs))
         light = (
             LIGHT[0] < body.size / max(numbers, 1) <= LIGHT[1]
             and max((*sizes, *map(len, tape.outputs)), default=0) > SHORT
@@ -166,8 +219,8 @@ def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBod
         return replace(body, twin=_twin(tape, sizes, target), past=body.size <= MOVING * numbers, light=light)
     parts = []
     for part in pieces.parts:
-        body = _body(part.tape, target, ports)
-        moved = [replace(store, entry=place) for store, place in zip(body.stores, part.places, strict=True)]
+        body = _body(part.tape, target, ports, [[f"work[{place}]" for place in part.places]])
+        moved = [replace(store, entry=part.places[store.entry]) for store in body.stores]
         parts.append(replace(body, stores=tuple(moved)))
     return replace(
         _body(pieces.last, target, ports),
@@ -179,15 +232,20 @@ def lane_body(tape: Tape, sizes: Sequence[int], target: Target = C99) -> LaneBod
 
 
 def _twin(tape: Tape, sizes: Sequence[int], target: Target) -> LaneBody:
-    emitter = _Emitter(tape, target, -1, _Names("s", "q", tuple(sizes)))
+    places = [
+        [f"out{port}[{len(each) + entry}]" for entry in range(len(each))] for port, each in enumerate(tape.outputs)
+    ]
+    emitter = _Emitter(tape, target, -1, places, _Names("s", "q", tuple(sizes)))
     body = _emitted(tape, emitter)
     return replace(
         body, stores=tuple(replace(store, entry=store.entry + len(tape.outputs[store.port])) for store in body.stores)
     )
 
 
-def _body(tape: Tape, target: Target, work: int = -1) -> LaneBody:
-    return _emitted(tape, _Emitter(tape, target, work))
+def _body(tape: Tape, target: Target, work: int = -1, places: Sequence[Sequence[str]] = ()) -> LaneBody:
+    """`places`: where each entry of each output is stored, if not in the output."""
+    own = [[f"out{port}[{entry}]" for entry in range(len(each))] for port, each in enumerate(tape.outputs)]
+    return _emitted(tape, _Emitter(tape, target, work, places or own))
 
 
 def _emitted(tape: Tape, emitter: _Emitter) -> LaneBody:
@@ -202,9 +260,11 @@ def _emitted(tape: Tape, emitter: _Emitter) -> LaneBody:
             LaneStore(port, entry, emitter.number(index))
             for port, entries in enumerate(tape.outputs)
             for entry, index in enumerate(entries)
+            if index not in emitter.stored
         ),
         slow=tuple(sorted({s.op for s in tape.statements} & SLOW_FORMS.keys())),
         read=frozenset(s.slot[0] for s in tape.statements if s.op == "INPUT"),
+        patches=tuple(each.routine for each in emitter.done if isinstance(each, LanePatch)),
     )
 
 
@@ -220,9 +280,15 @@ class _Names:
 class _Emitter:
     """Names of values, as numbers and as masks."""
 
-    def __init__(self, tape: Tape, target: Target, work: int, names: _Names = _Names()) -> None:
+    def __init__(
+        self, tape: Tape, target: Target, work: int, places: Sequence[Sequence[str]], names: _Names = _Names()
+    ) -> None:
+        self._tape = tape
+        self._chosen = chosen_results(tape)
+        self.stored: set[int] = set()
         self._target = target
         self._work = work
+        self._places = places
         self._names = names
         self.done: list[LaneStatement | LaneBlock] = []
         self._numbers: dict[int, str] = {}
@@ -254,6 +320,8 @@ class _Emitter:
             self._numbers[index] = f"{self._pairs[operands]}.{'s' if op == 'SIN' else 'c'}"
         elif op == "CALL":
             self._call(index, statement)
+        elif op == "RESULT" and index in self._numbers:
+            pass  # named by its call
         elif op == "RESULT":
             self._numbers[index] = f"{self._numbers[operands[0]]}[{statement.slot[0]}]"
         elif op in MASK_FORMS:
@@ -286,16 +354,37 @@ class _Emitter:
         routine = statement.routine
         if routine is None:
             raise CodegenError("a call without a routine")
-        name = f"{self._names.value}{index}"
+        name = self._numbers[index] = f"{self._names.value}{index}"
         condition = self._mask(statement.operands[0])
-        arguments = ", ".join(self.number(i) for i in statement.operands[1:])
+        arguments = tuple(self.number(i) for i in statement.operands[1 : 1 + routine.inputs])
         # A routine without settings for single precision computes in double whatever calls it.
         real = "LCG_ALWAYS_DOUBLE" if routine.single is None else "double"
-        expression = (
-            f"LCG_CALL({real}, {routine.name}, {routine.inputs}, {routine.outputs}, {condition}, {name}, {arguments})"
-        )
+        if index in self._chosen:
+            of = LaneRoutine(real, routine.name, routine.inputs, routine.outputs)
+            found = output_places(self._tape, index, self._chosen[index])
+            array, places = "", tuple[int, ...]()
+            if found is not None:
+                name_of, _, first = self._places[found[0]][0].rstrip("]").partition("[")
+                array = f"{name_of} + {first}"
+                places = () if found[1] == tuple(range(routine.outputs)) else found[1]
+            patch = LanePatch("lcg_v", name, "", 0, of, condition, arguments, self._choices(index), array, places)
+            self.done.append(patch)
+            return
+        sizes = f"{routine.inputs}, {routine.outputs}"
+        expression = f"LCG_CALL({real}, {routine.name}, {sizes}, {condition}, {name}, {', '.join(arguments)})"
         self.done.append(LaneStatement("lcg_v", name, expression, routine.outputs))
-        self._numbers[index] = name
+
+    def _choices(self, call: int) -> tuple[tuple[str, bool, int, str], ...]:
+        chosen: list[tuple[str, bool, int, str]] = []
+        for each in self._chosen[call]:
+            name = self._numbers[each.statement] = f"{self._names.value}{each.statement}"
+            default = self.number(each.default)
+            if each.is_read:
+                chosen.append((name, True, each.entry, default))
+            else:
+                self.stored.add(each.statement)
+                chosen += [(self._places[port][entry], False, each.entry, default) for port, entry in each.outputs]
+        return tuple(chosen)
 
     def _add(self, kind: str, index: int, expression: str) -> None:
         name = f"{self._names.value}{index}"

@@ -120,7 +120,8 @@ def render_library(namespace: str, kernels: Sequence[Kernel], real: str = "doubl
     header = "lie_codegen_lanes.h" if real == "double" else "lie_codegen_lanes_float.h"
     reduces = any(kernel.is_step and len(kernel.outputs) > 1 for kernel in view.kernels)
     both = list(zip(view.kernels, bodies, strict=True))
-    binding = render("binding.c.jinja", package=view, kernels=both, header=header, reduces=reduces)
+    patches = tuple(dict.fromkeys(each for body in bodies for part in (*body.parts, body) for each in part.patches))
+    binding = render("binding.c.jinja", package=view, kernels=both, header=header, reduces=reduces, patches=patches)
     files = {
         f"{namespace}.h": render("header.h.jinja", package=view),
         f"{namespace}.c": render("source.c.jinja", package=view),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from lie_codegen.codegen.call_defaults import chosen_results
 from lie_codegen.codegen.tape import Statement, Tape
 
 #: Statements of one function. Measured with gcc 12: 20,000 in one take 10 s, in parts of this size 2 s; shorter parts
@@ -44,6 +45,14 @@ def split(tape: Tape, ports: int, limit: int | None = None) -> Split | None:
     computed = [index for index, statement in enumerate(tape.statements) if statement.op not in ("INPUT", "CONST")]
     if len(computed) <= limit:
         return None
+    # A call that has the outputs as its defaults stands where they are stored: else they would cross twice.
+    calls = {call for call, chosen in chosen_results(tape).items() if not any(each.is_read for each in chosen)}
+    late = {
+        i
+        for i in computed
+        if i in calls or (tape.statements[i].op == "RESULT" and tape.statements[i].operands[0] in calls)
+    }
+    computed = [index for index in computed if index not in late]
     cuts: list[list[int]] = [[]]
     for index in computed:
         # The results of a call stay with it: what crosses from part to part is a number.
@@ -54,9 +63,9 @@ def split(tape: Tape, ports: int, limit: int | None = None) -> Split | None:
     outputs = {index for port in tape.outputs for index in port}
     crossing = {
         operand
-        for index in computed
+        for index in (*computed, *late)
         for operand in tape.statements[index].operands
-        if operand in home and home[operand] != home[index]
+        if operand in home and home[operand] != home.get(index)
     } | (outputs & home.keys())
     place = {index: number for number, index in enumerate(sorted(crossing))}
     parts = []
@@ -64,7 +73,7 @@ def split(tape: Tape, ports: int, limit: int | None = None) -> Split | None:
         left = [index for index in cut if index in place]
         piece = _piece(tape, cut, place, ports, (left,))
         parts.append(Part(piece, tuple(place[index] for index in left)))
-    return Split(tuple(parts), _piece(tape, (), place, ports, tape.outputs), ports, len(place))
+    return Split(tuple(parts), _piece(tape, sorted(late), place, ports, tape.outputs), ports, len(place))
 
 
 def _piece(tape: Tape, own: Iterable[int], place: dict[int, int], work: int, outputs: Iterable[Iterable[int]]) -> Tape:

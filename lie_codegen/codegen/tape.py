@@ -7,51 +7,26 @@ every value has one name, so that the same program can be printed for scalars or
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
+from lie_codegen.codegen.call_defaults import with_defaults, with_guards
+from lie_codegen.codegen.statement import Statement as Statement
+from lie_codegen.codegen.statement import Tape as Tape
 from lie_codegen.errors import CodegenError
 from lie_codegen.kernel.kernel import Kernel
 from lie_codegen.kernel.routine import Routine
 
 
-class Statement(NamedTuple):
-    """One value. `operands` are indices of earlier statements. A tuple, for a kernel has thousands, which are made, hashed and compared.
-
-    `op` is CALL (of `routine`, operands its condition and its inputs), RESULT (entry `slot[0]` of a CALL, which it follows), INPUT (entry `slot[1]` of port `slot[0]`), CONST (`value`), SELECT (operand 1 where operand
-    0 is not zero, else operand 2), or CasADi's name without its OP_.
-    """
-
-    op: str
-    operands: tuple[int, ...] = ()
-    slot: tuple[int, int] = (-1, -1)
-    value: float = 0.0
-    routine: Routine | None = None
-
-
-@dataclass(frozen=True)
-class Tape:
-    """A straight-line program.
-
-    Attributes:
-        statements: in order of evaluation: inputs first; sin and cos of one argument adjacent.
-        outputs: for each port, the statement of each of its entries, in C order.
-    """
-
-    statements: tuple[Statement, ...]
-    outputs: tuple[tuple[int, ...], ...]
-
-
-def tape_of(kernel: Kernel, real: str = "double") -> Tape:
-    """The tape of a kernel, for C in `real`.
+def tape_of(kernel: Kernel, real: str = "double", *, routines: bool = True) -> Tape:
+    """The tape of a kernel, for C in `real`; without `routines` NaN where these alone know the value.
 
     Raises:
         CodegenError: the kernel uses an operation that has no scalar meaning.
     """
     from lie_codegen.kernel.casadi_arithmetic import function_of
 
-    return tape_of_function(function_of(kernel, real))
+    return tape_of_function(function_of(kernel, real, routines=routines))
 
 
 def tape_of_function(function: Any) -> Tape:
@@ -66,7 +41,7 @@ def tape_of_function(function: Any) -> Tape:
         raise CodegenError(f"{function.name()} depends on symbols that are no inputs: {function.get_free()}")
     statements, outputs = _single_assignment(function)
     statements = _fuse_branches(statements)
-    return _schedule(statements, outputs)
+    return _schedule(*with_guards(*with_defaults(statements, outputs)))
 
 
 @cache

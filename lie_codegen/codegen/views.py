@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from lie_codegen.codegen.call_defaults import chosen_results, whole_output
 from lie_codegen.codegen.opcodes import C99, RESERVED, Target, in_single
 from lie_codegen.codegen.signature import is_step
 from lie_codegen.codegen.split import split
@@ -64,7 +65,9 @@ class StatementView:
     another thing: it knows its type, a mask or numbers, may be skipped, and prints itself beside its twin: `lanes.LaneStatement`.
 
     A call of a routine leaves an array, of `results` numbers of `type_name`: <expression>(arguments, <name>), where `condition` holds if it
-    has one.
+    has one, and where it does not the numbers are zeros. With `defaults` it leaves numbers of its own and entries of arrays: (what is declared or
+    stored, whether it is declared, its place among the results, its value where the condition does not hold) each; with `place` these are entries of
+    that array, in their order, but for others that are stored later.
     """
 
     name: str
@@ -73,6 +76,8 @@ class StatementView:
     results: int = 0
     condition: str = ""
     type_name: str = ""
+    defaults: tuple[tuple[str, bool, int, str], ...] = ()
+    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -181,12 +186,22 @@ def _routine_target(routine: Routine, target: Target) -> Target:
 
 def _routine_views(routines: Iterable[Routine], target: Target) -> tuple[RoutineView, ...]:
     """The C text of routines and of the kernels they call, each of these once."""
-    views, printed = [], set[str]()
-    for routine in routines:
+    views: list[RoutineView] = []
+    printed, begun = set[str](), set[str]()
+
+    def add(routine: Routine) -> None:
+        if routine.name in begun:
+            return
+        begun.add(routine.name)
         fresh = [kernel for kernel in routine.helpers if kernel.symbol not in printed]
         printed.update(kernel.symbol for kernel in fresh)
         own = _routine_target(routine, target)
-        helpers = tuple(kernel_view(kernel, tape_of(kernel, own.type_name), own, in_parts=True) for kernel in fresh)
+        tapes = [tape_of(kernel, own.type_name) for kernel in fresh]
+        for inner in routines_of(tapes):
+            add(inner)
+        helpers = tuple(
+            kernel_view(kernel, tape, own, in_parts=True) for kernel, tape in zip(fresh, tapes, strict=True)
+        )
         settings = dict(routine.settings)
         if own.type_name == "float":
             settings |= dict(routine.single or ())
@@ -194,6 +209,9 @@ def _routine_views(routines: Iterable[Routine], target: Target) -> tuple[Routine
         views.append(
             RoutineView(helpers, in_single(text) if own.type_name == "float" else text, own.type_name, routine.name)
         )
+
+    for routine in routines:
+        add(routine)
     return tuple(views)
 
 
@@ -215,13 +233,11 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: b
     last, size = (tape, 0) if pieces is None else (pieces.last, pieces.size)
     parts = []
     for part in pieces.parts if pieces is not None else ():
-        statements, values = _printed(part.tape, [*names, work], [*scalars, work], target, prefix, calls=True)
-        stores = tuple(
-            StoreView(work, place, values[index])
-            for place, index in zip(part.places, part.tape.outputs[0], strict=True)
-        )
-        parts.append(PartView(statements, stores, _unread(inputs, part.tape)))
-    statements, values = _printed(last, [*names, work], [*scalars, work], target, prefix, calls=in_parts)
+        stores = [[(work, place) for place in part.places]]
+        statements, left = _printed(part.tape, [*names, work], [*scalars, work], stores, target, prefix, calls=True)
+        parts.append(PartView(statements, left, _unread(inputs, part.tape)))
+    stores = [[(port.parameter, entry) for entry in range(port.size)] for port in outputs]
+    statements, left = _printed(last, [*names, work], [*scalars, work], stores, target, prefix, calls=in_parts)
     return KernelView(
         name=kernel.name,
         symbol=kernel.symbol,
@@ -232,11 +248,7 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: b
         outputs=outputs,
         unused=_unread(inputs, tape) if pieces is None else (),
         statements=statements,
-        stores=tuple(
-            StoreView(port.parameter, entry, values[index])
-            for port, entries in zip(outputs, last.outputs, strict=True)
-            for entry, index in enumerate(entries)
-        ),
+        stores=left,
         is_step=is_step(kernel.inputs, kernel.outputs),
         parts=tuple(parts),
         work=work,
@@ -245,11 +257,23 @@ def kernel_view(kernel: Kernel, tape: Tape, target: Target = C99, *, in_parts: b
 
 
 def _printed(
-    tape: Tape, arrays: Sequence[str | None], scalars: Sequence[str], target: Target, prefix: str, *, calls: bool
-) -> tuple[tuple[StatementView, ...], list[str]]:
-    """The statements, and the text of every value; a port without an array is a scalar."""
+    tape: Tape,
+    arrays: Sequence[str | None],
+    scalars: Sequence[str],
+    stores: Sequence[Sequence[tuple[str, int]]],
+    target: Target,
+    prefix: str,
+    *,
+    calls: bool,
+) -> tuple[tuple[StatementView, ...], tuple[StoreView, ...]]:
+    """The statements, and the stores after them, of each entry of each output; an input port without an array is a scalar.
+
+    What a call with defaults leaves to outputs alone is stored with it: a value then waits for no branch.
+    """
     values: list[str] = []
     statements: list[StatementView] = []
+    chosen = chosen_results(tape)
+    done: set[int] = set()
     for index, statement in enumerate(tape.statements):
         if statement.op == "CONST":
             values.append(target.literal(statement.value))
@@ -264,7 +288,23 @@ def _printed(
                     "a kernel that calls a routine has no form in this package: it is printed in packages of kernels alone"
                 )
             values.append(f"{prefix}{index}")
-            statements.append(_call(statement, values, target))
+            defaults: list[tuple[str, bool, int, str]] = []
+            for each in chosen.get(index, ()):
+                default = values[each.default]
+                if each.is_read:
+                    defaults.append((f"{prefix}{each.statement}", True, each.entry, default))
+                else:
+                    done.add(each.statement)
+                    places = ["{}[{}]".format(*stores[port][entry]) for port, entry in each.outputs]
+                    defaults += [(place, False, each.entry, default) for place in places]
+            call = replace(_call(statement, values, target), defaults=tuple(defaults))
+            whole = whole_output(tape, index, chosen[index]) if index in chosen else None
+            if whole is not None and call.type_name == target.type_name:
+                call = replace(call, place=stores[whole][0][0])
+            statements.append(call)
+            continue
+        elif statement.op == "RESULT" and statement.operands[0] in chosen:
+            values.append(f"{prefix}{index}")
             continue
         elif statement.op == "RESULT":
             number = f"{values[statement.operands[0]]}[{statement.slot[0]}]"
@@ -275,14 +315,20 @@ def _printed(
             text = target.expression(statement.op, tuple(values[i] for i in statement.operands))
         values.append(f"{prefix}{index}")
         statements.append(StatementView(values[-1], text))
-    return tuple(statements), values
+    left = tuple(
+        StoreView(*stores[port][entry], values[index])
+        for port, entries in enumerate(tape.outputs)
+        for entry, index in enumerate(entries)
+        if index not in done
+    )
+    return tuple(statements), left
 
 
 def _call(statement: Statement, values: Sequence[str], target: Target) -> StatementView:
     routine = statement.routine
     if routine is None:
         raise CodegenError("a call without a routine")
-    condition, *arguments = (values[i] for i in statement.operands)
+    condition, *arguments = (values[i] for i in statement.operands[: 1 + routine.inputs])
     always = condition.rstrip("f") == C99.literal(1.0)
     type_name = _routine_target(routine, target).type_name
     if type_name != target.type_name:
