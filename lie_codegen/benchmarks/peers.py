@@ -69,7 +69,7 @@ def need(name: str) -> Any:
 
 def as_python(kernel: Kernel, folder: Path, module: str, *, scalars: bool) -> Any:
     """The kernel as a Python module over `module` (math, numpy, jax.numpy)."""
-    view = kernel_view(kernel, tape_of(kernel), SCALAR if scalars else ARRAYS)
+    view = kernel_view(kernel, tape_of(kernel, routines=False), SCALAR if scalars else ARRAYS)
     name = f"{kernel.symbol}_{module.replace('.', '_')}"
     file = folder / f"{name}.py"
     file.write_text(render("bench_peer.py.jinja", kernel=view, module=module, scalars=scalars), encoding="utf-8")
@@ -96,7 +96,7 @@ def as_casadi_c(kernel: Kernel, folder: Path) -> tuple[ctypes.CDLL, Any]:
     generator = ca.CodeGenerator(f"{kernel.symbol}_casadi.c", {"casadi_int": "long long int"})
     generator.add(function)
     (folder / f"{kernel.symbol}_casadi.c").write_text(generator.dump(), encoding="utf-8")
-    view = kernel_view(kernel, tape_of(kernel))
+    view = kernel_view(kernel, tape_of(kernel, routines=False))
     main = f"{kernel.symbol}_loop.c"
     (folder / main).write_text(render("bench_loop.c.jinja", kernel=view, work=function.sz_w() + 8), encoding="utf-8")
     output = f"{kernel.symbol}_loop.so"

@@ -83,7 +83,7 @@ class SymForce:
             raise AbsentError("no C++ compiler")
         stem = module or f"{self._kernel.symbol}_symforce_loop"
         source, library = self._folder / f"{stem}.cpp", self._folder / f"{stem}.so"
-        view = kernel_view(self._kernel, tape_of(self._kernel))
+        view = kernel_view(self._kernel, tape_of(self._kernel, routines=False))
         text = render(
             "bench_symforce.cpp.jinja", kernel=view, header=self._header, function=self._function, module=module
         )

@@ -98,7 +98,7 @@ def device_text(kernels: Sequence[Kernel], target: str, real: str) -> str:
 
 
 def _tape(kernel: Kernel) -> Tape:
-    tape = tape_of(kernel)
+    tape = tape_of(kernel, routines=False)
     if any(statement.op == "CALL" for statement in tape.statements):
         raise CodegenError(
             f"{kernel.symbol} calls a routine with loops, which runs on the processor alone; leave it out of device_source"

@@ -122,6 +122,16 @@ class GroupDerivation:
         )
 
     @cached_property
+    def is_antisymmetric(self) -> bool:
+        """Whether the matrices of the algebra are real and antisymmetric."""
+        return not self.group.is_complex and all((m + m.T).is_zero_matrix for m in self.group.exact_basis)
+
+    @cached_property
+    def adjoint_is_antisymmetric(self) -> bool:
+        """The same of ad x."""
+        return all((m + m.T).is_zero_matrix for m in self.ads)
+
+    @cached_property
     def matrix_relation(self) -> Relation:
         """Which entries of a function of hat(x) follow from others."""
         from lie_codegen.exact.invariant_form import matrix_relation

@@ -57,4 +57,4 @@ def device_source(
 def _loops(kernel: Kernel) -> bool:
     from lie_codegen.codegen.tape import tape_of
 
-    return any(statement.op == "CALL" for statement in tape_of(kernel).statements)
+    return any(statement.op == "CALL" for statement in tape_of(kernel, routines=False).statements)

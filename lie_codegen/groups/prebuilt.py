@@ -29,9 +29,11 @@ SHARED, SHARED_STORE = "lie_codegen_lanes.h", "lanes"
 #: What becomes C text beside the functions.
 TEMPLATES = (
     "binding.c.jinja",
+    "far_routine.c.jinja",
     "header.h.jinja",
     "lanes.h.jinja",
     "lanes_records.h.jinja",
+    "log_routine.c.jinja",
     "macros.jinja",
     "source.c.jinja",
 )

@@ -78,6 +78,8 @@ def terms(ops: Arithmetic, double: int, single: int) -> int:
 class FloatArithmetic:
     """Python floats: the plain meaning of a kernel, without any library."""
 
+    routines = True
+
     def constant(self, value: Any) -> float:
         return float(value)
 

@@ -13,14 +13,23 @@ from lie_codegen.errors import ShapeError
 from lie_codegen.kernel.arithmetic import ROUNDOFF, FloatArithmetic
 from lie_codegen.kernel.complex_scalar import Complex
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.routine import Routine
+from lie_codegen.kernel.routine import Routine, Where
 
 
 class CasadiArithmetic:
-    """SX scalars; exact constants become the nearest doubles. `real` is the type of the C that the graph is for."""
+    """SX scalars; exact constants become the nearest doubles.
 
-    def __init__(self, real: str = "double") -> None:
+    Attributes:
+        real: the type of the C that the graph is for.
+        routines: whether a routine may stand for what a straight line cannot say; where it may not, that is NaN.
+        differentiated: whether CasADi will differentiate the graph: of a choice it weighs the side that is not taken with zero, so that side
+            has to be finite, with its derivatives.
+    """
+
+    def __init__(self, real: str = "double", *, routines: bool = True, differentiated: bool = False) -> None:
         self.unit_roundoff = ROUNDOFF[real]
+        self.routines = routines
+        self.differentiated = differentiated
 
     def constant(self, value: Any) -> float:
         return float(value)
@@ -84,8 +93,8 @@ class _RoutineFunction(ca.Callback):
         return True
 
     def get_forward(self, count: int, name: str, inames: Any, onames: Any, options: Any) -> ca.Function:
-        ops, routine = CasadiArithmetic(), self.routine
         number, condition = ca.SX.sym("number"), ca.SX.sym("condition")
+        ops, routine = Where(CasadiArithmetic(differentiated=True), condition), self.routine
         inputs, outputs = ca.SX.sym("inputs", routine.inputs), ca.SX.sym("outputs", routine.outputs)
         rates = ca.SX.sym("rates", routine.inputs, count)
         unused = [ca.SX.sym("unused", 1, count), ca.SX.sym("unused", 1, count)]
@@ -102,18 +111,29 @@ class _RoutineFunction(ca.Callback):
         return function
 
 
-_FUNCTIONS: dict[Routine, _RoutineFunction] = {}
+def _choice(routine: Routine, graph: Callable[[], ca.Function]) -> ca.Function:
+    """The same of a routine that CasADi can say itself: what the condition does not ask for is not run."""
+    inputs = ca.SX.sym("inputs", routine.inputs)
+    zeros = ca.Function("zeros", [inputs], [ca.SX(ca.DM.zeros(routine.outputs))])
+    chosen = ca.Function.if_else("chosen", graph(), zeros)
+    symbols = [ca.MX.sym("number"), ca.MX.sym("condition"), ca.MX.sym("inputs", routine.inputs)]
+    return ca.Function(ca.Function.fix_name(routine.name), symbols, [chosen(*symbols[1:])], {"never_inline": True})
+
+
+_FUNCTIONS: dict[Routine, ca.Function] = {}
 _NUMBERS: dict[Routine, float] = {}
 #: A number that no formula holds: were it one of its constants, the printed C would depend on what was derived before.
 _FIRST_NUMBER = -(2.0**52)
 _LOCK = threading.Lock()
 
 
-def _called(routine: Routine) -> _RoutineFunction:
+def _called(routine: Routine) -> ca.Function:
     with _LOCK:
         if routine not in _FUNCTIONS:
             _NUMBERS[routine] = _FIRST_NUMBER + len(_NUMBERS)
-            _FUNCTIONS[routine] = _RoutineFunction(routine)
+            _FUNCTIONS[routine] = (
+                _RoutineFunction(routine) if routine.graph is None else _choice(routine, routine.graph)
+            )
         return _FUNCTIONS[routine]
 
 
@@ -122,15 +142,16 @@ def routine_number(number: float) -> Routine:
     return next(routine for routine, each in _NUMBERS.items() if each == number)
 
 
-def function_of(kernel: Kernel, real: str = "double") -> ca.Function:
+def function_of(kernel: Kernel, real: str = "double", *, routines: bool = True) -> ca.Function:
     """The kernel as a CasADi Function of dense column vectors.
 
     Each port becomes one column vector of `port.size` entries in C order: row-major, complex entries as
-    interleaved (re, im). No transposition is left to do in C or in numpy. `real`: the type of the C that it becomes.
+    interleaved (re, im). No transposition is left to do in C or in numpy. `real`: the type of the C that it becomes; `routines`: see
+    `CasadiArithmetic`.
     """
     symbols = [ca.SX.sym(port.name, port.size) for port in kernel.inputs]
     arguments = [_unflatten(port, ca.vertsplit(symbol)) for port, symbol in zip(kernel.inputs, symbols, strict=True)]
-    results = kernel.evaluate(CasadiArithmetic(real), *arguments)
+    results = kernel.evaluate(CasadiArithmetic(real, routines=routines), *arguments)
     flat = [
         ca.densify(ca.vertcat(*[ca.SX(entry) for entry in flatten(port, value)]))
         for port, value in zip(kernel.outputs, results, strict=True)

@@ -17,8 +17,8 @@ def casadi_function(kernel: Kernel) -> ca.Function:
     A scalar port is 1 x 1, a vector (n,) is n x 1, a matrix (r, c) is r x c, all dense. Complex entries stand as neighbours
     (re, im) in a row, as NumPy sees them through `X.view(float)`: a complex scalar is 2 x 1, a vector 2n x 1, a matrix r x 2c.
 
-    CasADi differentiates the Function, to any order where the kernel holds no loop. C for flight comes from `build` and
-    `generate`, their derivatives from `jacobian`.
+    CasADi differentiates the Function, to any order where the kernel holds no loop that C alone knows, as logarithms by iterations.
+    C for flight comes from `build` and `generate`, their derivatives from `jacobian`.
 
     Raises:
         InputError: what is given is no Kernel.
@@ -29,7 +29,7 @@ def casadi_function(kernel: Kernel) -> ca.Function:
         )
     symbols = [ca.SX.sym(port.name, *_shape(port)) for port in kernel.inputs]
     arguments = [_value(port, symbol) for port, symbol in zip(kernel.inputs, symbols, strict=True)]
-    results = kernel.evaluate(CasadiArithmetic(), *arguments)
+    results = kernel.evaluate(CasadiArithmetic(differentiated=True), *arguments)
     outputs = [_matrix(port, value) for port, value in zip(kernel.outputs, results, strict=True)]
     names = [port.name for port in kernel.inputs], [port.name for port in kernel.outputs]
     return ca.Function(ca.Function.fix_name(kernel.symbol), symbols, outputs, *names, {"cse": True})

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar, unit_roundoff
-from lie_codegen.kernel.routine import call_routine
+from lie_codegen.kernel.routine import Where, call_routine
 from lie_codegen.kernel.structural_zeros import add, is_zero, product
 
 
@@ -104,6 +104,8 @@ class DualArithmetic:
         self.ops = ops
         self.level: int = getattr(ops, "level", 0) + 1
         self.unit_roundoff = unit_roundoff(ops)
+        self.routines: bool | None = getattr(ops, "routines", None)
+        self.differentiated: bool = getattr(ops, "differentiated", False)
 
     def variable(self, value: Scalar, tangent: Mapping[int, Scalar]) -> Dual:
         """value + sum tangent[i] e_i, structural zeros dropped."""
@@ -184,8 +186,9 @@ class DualArithmetic:
         if not directions:
             return outputs
         rates: dict[int, list[Scalar]] = {}
+        ops = self.ops if when is None else Where(self.ops, when)
         for i in directions:
-            moved = routine.tangent(self.ops, plain, outputs, [tangent.get(i, 0) for _, tangent in pairs])
+            moved = routine.tangent(ops, plain, outputs, [tangent.get(i, 0) for _, tangent in pairs])
             rates[i] = moved if when is None else [self.ops.where(when, rate, 0) for rate in moved]
         return [
             Dual(value, {i: rates[i][k] for i in directions if not is_zero(rates[i][k])}, self.level)

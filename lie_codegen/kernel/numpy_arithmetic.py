@@ -16,6 +16,8 @@ from lie_codegen.kernel.kernel import Kernel, Port
 class NumpyArithmetic:
     """Element by element; both branches of `where` are evaluated, as in generated code."""
 
+    routines = True
+
     def constant(self, value: Any) -> float:
         return float(value)
 

@@ -40,6 +40,8 @@ class Routine:
         evaluate: its twin.
         tangent: its derivative, in any arithmetic, from inputs and outputs.
         single: settings that are others in single precision; None: the routine computes in double whatever the package does.
+        graph: it as a CasADi Function of one column to one column, where it has such a form: CasADi then runs it without Python and
+            differentiates it to any order.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Routine:
     evaluate: Callable[[Sequence[float]], Sequence[float] | Array] = field(compare=False)
     tangent: Tangent = field(compare=False)
     single: tuple[tuple[str, Any], ...] | None = None
+    graph: Callable[[], Any] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         check_identifier(self.name, "routine name")
@@ -67,3 +70,19 @@ def call_routine(ops: Any, routine: Routine, values: Sequence[Scalar], when: Any
         raise CodegenError(f"{routine.name} is a loop: it has no form in {type(ops).__name__}")
     result: list[Scalar] = method(routine, list(values), when)
     return result
+
+
+class Where:
+    """An arithmetic in which routines run only where a condition holds."""
+
+    def __init__(self, ops: Any, condition: Any) -> None:
+        self._ops = ops
+        self._condition = condition
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._ops, name)
+
+    def call(self, routine: Routine, values: Sequence[Scalar], when: Any = None) -> list[Scalar]:
+        """The routine where both conditions hold."""
+        both = self._condition if when is None else self._ops.where(self._condition, when, 0)
+        return call_routine(self._ops, routine, values, both)

@@ -3,8 +3,8 @@
     ljac(x) = sum_k ad_x^k / (k + 1)!,  rjac(x) = ljac(-x),  ljac(x) = Ad(exp x) rjac(x),
     d/dt exp(x) = hat(ljac(x) x') exp(x) = exp(x) hat(rjac(x) x').
 
-Both sides of the second line are differenced in the tests. Closed forms: `matrix_function`; the rest: `spectral_functions`. Either is
-imported by the first matrix that it is derived for, since compiled kernels are found in the cache without.
+Both sides of the second line are differenced in the tests. Closed forms: `matrix_function`; the rest: `spectral_functions`, and beyond its
+reach `far_routine`. Either is imported by the first matrix that it is derived for, since compiled kernels are found in the cache without.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ def exp_matrix(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> l
     """exp(hat(x)); Complex entries for a complex group."""
     group = data.group
     if data.matrix_pattern is None:
+        from lie_codegen.groups.maps.far_routine import chosen, far_exponential
         from lie_codegen.groups.maps.rkmk import hat_body
         from lie_codegen.groups.maps.spectral_functions import exponential
 
         traceless = all(matrix.trace() == 0 for matrix in group.exact_basis)
         A = hat_body(group, ops, x)
-        return exponential(
-            ops, A, data.matrix_spectrum, data.matrix_relation, unitary=data.is_unitary, traceless=traceless
-        )
+        normal = data.is_unitary or data.is_antisymmetric
+        X, near = exponential(ops, A, data.matrix_spectrum, data.matrix_relation, normal=normal, traceless=traceless)
+        return chosen(ops, near, X, lambda: far_exponential(data), x)
     from lie_codegen.groups.maps.analytic_functions import EXP
     from lie_codegen.groups.maps.linear_family import LinearFamily
     from lie_codegen.groups.maps.matrix_function import FunctionOfMatrix
@@ -48,14 +49,12 @@ def exp_matrix(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar]) -> l
 
 def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: str, *, inverse: bool) -> Matrix:
     """(n, n) ljac or rjac of x, or its inverse; singular where ad x has an eigenvalue 2 pi i k, k != 0."""
-    if data.adjoint_pattern is None and data.adjoint_spectrum is not None:
-        from lie_codegen.groups.maps.spectral_functions import inverse_jacobian_of_exp, jacobian_of_exp
-
-        function = inverse_jacobian_of_exp if inverse else jacobian_of_exp
-        sign = 1 if side == "left" else -1
-        return function(ops, ad(ops, data.group.algebra, x), data.adjoint_spectrum, data.adjoint_relation, sign)
     if data.adjoint_pattern is None:
-        return _plain(ops, data, x, 1 if side == "left" else -1, inverse=inverse)
+        from lie_codegen.groups.maps.far_routine import chosen, far_jacobian
+
+        sign = 1 if side == "left" else -1
+        J, near = _spectral(ops, data, x, sign, inverse=inverse)
+        return chosen(ops, near, J, lambda: far_jacobian(data, sign, inverse=inverse), x)
     from lie_codegen.groups.maps.analytic_functions import JACOBIANS
     from lie_codegen.groups.maps.linear_family import LinearFamily
     from lie_codegen.groups.maps.matrix_function import FunctionOfMatrix
@@ -67,18 +66,30 @@ def jacobian(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], side: 
     return [[column.get(i, 0) for column in columns] for i in range(n)]
 
 
-def _plain(ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], sign: int, *, inverse: bool) -> Matrix:
-    """The Jacobian modulo the characteristic polynomial of ad; its inverse by blocks."""
-    from lie_codegen.groups.maps.spectral_functions import plain_jacobian_of_exp
+def _spectral(
+    ops: Arithmetic, data: GroupDerivation, x: Sequence[Scalar], sign: int, *, inverse: bool
+) -> tuple[Matrix, Any]:
+    """The Jacobian modulo the characteristic polynomial of ad, and where it is right; without pairs of eigenvalues its inverse by blocks."""
+    from lie_codegen.groups.maps import spectral_functions
 
+    n, a = data.group.dim, ad(ops, data.group.algebra, x)
+    if data.adjoint_spectrum is not None:
+        function = spectral_functions.inverse_jacobian_of_exp if inverse else spectral_functions.jacobian_of_exp
+        normal = data.adjoint_is_antisymmetric
+        return function(ops, a, data.adjoint_spectrum, data.adjoint_relation, sign, normal=normal)
     traceless = all(matrix.trace() == 0 for matrix in data.ads)
-    J = plain_jacobian_of_exp(ops, ad(ops, data.group.algebra, x), traceless=traceless, sign=sign)
+    J, near = spectral_functions.plain_jacobian_of_exp(ops, a, traceless=traceless, sign=sign)
     if not inverse:
-        return J
-    n = data.group.dim
+        return J, near
+    if getattr(ops, "differentiated", False):  # what is not taken has to be finite
+        J = [[_regular(ops, near, entry, int(i == j)) for j, entry in enumerate(row)] for i, row in enumerate(J)]
     sparse = {(i, j): value for i, row in enumerate(J) for j, value in enumerate(row) if not is_zero(value)}
     columns = solve(sparse, [{j: 1} for j in range(n)], n)
-    return [[column.get(i, 0) for column in columns] for i in range(n)]
+    return [[column.get(i, 0) for column in columns] for i in range(n)], near
+
+
+def _regular(ops: Arithmetic, near: Any, entry: Scalar, one: int) -> Scalar:
+    return entry if is_zero(entry) else ops.where(near, entry, one)
 
 
 def coordinates(ops: Arithmetic, data: GroupDerivation, A: Matrix) -> Vector:

@@ -32,7 +32,7 @@ from lie_codegen.steering.ocp.model_sizes import Model, Sizes
 from lie_codegen.steering.ocp.problem_data import ProblemData, total_square
 from lie_codegen.steering.ocp.terms import Point
 
-_OPS = CasadiArithmetic()
+_OPS = CasadiArithmetic(routines=False)
 #: Terms of the series of J_r' lambda: to 1e-12 for |ad theta| <= 1, and curvature alone depends on it.
 _SERIES = 16
 

@@ -28,7 +28,7 @@ from lie_codegen.steering.transcription.stage_functions import StageFunctions, S
 from lie_codegen.steering.transcription.structure import Structure
 from lie_codegen.steering.transcription.tangent import ad_matrix, push, pushed, wedge
 
-_OPS = CasadiArithmetic()
+_OPS = CasadiArithmetic(routines=False)
 _EXPONENTIAL_DEGREE = 9
 _SLOPE_DEGREE = 7
 

@@ -14,7 +14,7 @@ from lie_codegen.kernel.casadi_arithmetic import CasadiArithmetic
 from lie_codegen.kernel.structural_zeros import is_zero
 from lie_codegen.on_demand import casadi as ca
 
-_OPS = CasadiArithmetic()
+_OPS = CasadiArithmetic(routines=False)
 
 
 def push(group: MatrixGroup, B: Array) -> tuple[Any, Any]:
