@@ -29,8 +29,9 @@ def expm(A: NDArray[Any]) -> NDArray[Any]:
     result = _block(powers, 12)
     for start in (8, 4, 0):
         result = result @ fourth + _block(powers, start)
-    for _ in range(squarings):
-        result = result @ result
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too large is infinite or NaN
+        for _ in range(squarings):
+            result = result @ result
     return np.asarray(result)
 
 

@@ -152,7 +152,7 @@ def _rotates(group: MatrixGroup) -> bool:
 
 
 def limits(group: MatrixGroup, controls: Sequence[int], given: Any, what: str) -> tuple[Array, Array]:
-    """(m,) lower and upper limits from a number (both signs), a (low, high) pair, or {label: either}; infinite if absent.
+    """(m,) lower and upper limits from a number (both signs), a (low, high) pair, m pairs, or {label: number or pair}; infinite if absent.
 
     Raises:
         SteeringInputError: an unknown label, a lower limit above the upper one, limits that exclude 0 where 0 is needed.
@@ -166,13 +166,24 @@ def box_limits(labels: Sequence[str], given: Any, what: str) -> tuple[Array, Arr
     low, high = np.full(m, -np.inf), np.full(m, np.inf)
     if given is None:
         return low, high
-    entries = given if isinstance(given, Mapping) else dict.fromkeys(labels, given)
+    entries = given if isinstance(given, Mapping) else _by_label(labels, given)
     for label, value in entries.items():
         if label not in labels:
             raise SteeringInputError(f"{what}: {label!r} is no control; the controls are {', '.join(labels)}")
         pair = _pair(value, what, label)
         low[list(labels).index(label)], high[list(labels).index(label)] = pair
     return low, high
+
+
+def _by_label(labels: Sequence[str], given: Any) -> dict[str, Any]:
+    """One for all, or the rows of (m, 2)."""
+    if (
+        isinstance(given, list | tuple | np.ndarray)
+        and len(given) == len(labels)
+        and all(np.shape(row) == (2,) for row in given)
+    ):
+        return dict(zip(labels, given, strict=True))
+    return dict.fromkeys(labels, given)
 
 
 def _pair(value: Any, what: str, label: str) -> tuple[float, float]:

@@ -121,7 +121,7 @@ def steer(
         tolerance: endpoint error |log(target^-1 X)| below which the plan counts as solved.
         start: (d, d) X(0), an element or coordinates; the identity if not given.
         drift: (n,) constant velocity beside the controls' own [units of u]; for "direct" also formulas of t or a function.
-        bounds: of the controls [units of u]: a number b for -b <= u <= b, a pair (low, high), or {label: either}; none.
+        bounds: of the controls [units of u]: a number b for -b <= u <= b, a pair (low, high), (m, 2) a pair for each, or {label: number or pair}; none.
         rate_bounds: of their time derivatives [units of u / s], as bounds; none (transcription).
         velocity_bounds: of any component of xi, as bounds, second order; none (transcription).
         weights: (m,) positive weights w_i of the cost sum w_i u_i^2; ones.

@@ -233,3 +233,13 @@ def test_targets_that_are_a_bracket_alone(name: str, target: float, cost: float)
     plan = lc.steer(lc.group(name), (0, 0, target), (0, 1), 1.0, bounds=5.0, starts=1)
     assert cost < plan.cost < cost * (1 + 1e-4)
     assert plan.error < 1e-8
+
+
+def test_bounds_by_rows_and_plans_that_are_the_same_are_equal() -> None:
+    """The wall time of a solver's call made two plans of the same problem differ."""
+    given = [{"omega": (-1, 1), "vx": (-0.2, 1)}, [(-1, 1), (-0.2, 1)], np.array([[-1, 1], [-0.2, 1]])]
+    plans = [
+        lc.steer("se2", (1, 0.5, 0.3), controls=("omega", "vx"), duration=3.0, method="transcription", bounds=bounds)
+        for bounds in given
+    ]
+    assert plans[0] == plans[1] == plans[2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,7 @@ class Solve:
     message: str
     objective: float
     violation: float
-    seconds: float
+    seconds: float = field(compare=False)
     residuals: dict[str, tuple[float, ...]]
 
 
