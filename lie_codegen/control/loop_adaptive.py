@@ -16,7 +16,8 @@ from lie_codegen.control.plants import GroupPlant
 from lie_codegen.errors import InputError
 from lie_codegen.flow.events import INNER, Event, EventHits, event_function, find_events
 from lie_codegen.flow.gauss_steps import gauss
-from lie_codegen.flow.pair853 import PairRun, integrate
+from lie_codegen.flow.pair853 import integrate
+from lie_codegen.flow.pair_run import PairRun
 from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import reach_of
 from lie_codegen.groups.maps.packed_arrays import elements_of

@@ -13,7 +13,7 @@ from lie_codegen.arrays import Array
 from lie_codegen.control.loop_adaptive import loop_system
 from lie_codegen.control.loop_library import loop_library
 from lie_codegen.control.loop_run import Run, refined
-from lie_codegen.flow.pair853 import PairRun
+from lie_codegen.flow.pair_run import PairRun
 from lie_codegen.kernel.plain_data import Definition, made_from
 from lie_codegen.kernel.records import check_kinds
 from lie_codegen.kernel.saved import Saved

@@ -15,7 +15,7 @@ from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.control.loop_run import Run
 from lie_codegen.control.loop_states import own_states
 from lie_codegen.flow.events import EventHits
-from lie_codegen.flow.pair853 import PairRun
+from lie_codegen.flow.pair_run import PairRun
 from lie_codegen.kernel.kernel import Port
 from lie_codegen.values import Later, made_of
 

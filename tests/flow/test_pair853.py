@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 import lie_codegen as lc
 from lie_codegen.errors import ComputationError
-from lie_codegen.flow import pair853
+from lie_codegen.flow import pair853, pair_single
 from lie_codegen.flow.pair853 import integrate
 from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import product_rate, reach_of, turning
@@ -214,7 +214,7 @@ def test_a_free_body_over_a_long_time_keeps_its_energy_to_the_tolerance() -> Non
 
 
 def test_a_state_that_escapes_is_refused_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pair853, "_MOST_STEPS", 20_000)
+    monkeypatch.setattr(pair_single, "MOST_STEPS", 20_000)
     system = with_numbers(free_body("so3", damping=True), np.eye(3), -1e3)
     with pytest.raises(ComputationError, match=r"no longer finite|grows without bound"):
         integrate(system, *start("so3", np.ones(3)), np.array([0.0, 5.0]), rtol=1e-9, atol=0.0, where="test")
@@ -223,7 +223,7 @@ def test_a_state_that_escapes_is_refused_with_the_time(monkeypatch: pytest.Monke
 def test_blocks_of_steps_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     system, times = with_numbers(free_body("so3"), np.diag([1.0, 2.0, 3.0])), np.linspace(0, 20, 7)
     whole = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
-    monkeypatch.setattr(pair853, "_STEPS", 5)
+    monkeypatch.setattr(pair_single, "STEPS", 5)
     parts = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
     np.testing.assert_allclose(parts.y, whole.y, rtol=0, atol=1e-13)
     np.testing.assert_allclose(parts.knot_t, whole.knot_t, rtol=0, atol=1e-12)
@@ -320,8 +320,8 @@ def test_interpolated_states_of_a_run_in_blocks_are_those_of_one_in_a_whole(monk
     times = np.linspace(0, 20, 301)
     system = interpolated(with_numbers(free_body("so3", damping=True), np.diag([1.0, 2.0, 3.0]), 1.0), "so3")
     whole = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
-    monkeypatch.setattr(pair853, "_FIRST_STEPS", 3)
-    monkeypatch.setattr(pair853, "_STEPS", 5)
+    monkeypatch.setattr(pair_single, "FIRST_STEPS", 3)
+    monkeypatch.setattr(pair_single, "STEPS", 5)
     parts = integrate(system, *start("so3", np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
     assert whole.steps == parts.steps
     np.testing.assert_allclose(parts.y, whole.y, rtol=0, atol=1e-13)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, logm
 
 import lie_codegen as lc
-from lie_codegen.flow import pair853
+from lie_codegen.flow import pair_single
 from lie_codegen.flow.pair853 import integrate
 from lie_codegen.flow.pair_system import System
 from lie_codegen.flow.product_rate import short_rate
@@ -251,8 +251,8 @@ def test_runs_in_blocks_and_in_one_call_are_the_same(monkeypatch: pytest.MonkeyP
     made, group, states = body("so3")
     system, times = replace(numbered(made, np.diag([1.0, 2.0, 3.0]), 1.0), steady=True), np.linspace(0, 20, 301)
     whole = integrate(system, *begun(group, states, np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
-    monkeypatch.setattr(pair853, "_FIRST_STEPS", 3)
-    monkeypatch.setattr(pair853, "_STEPS", 5)
+    monkeypatch.setattr(pair_single, "FIRST_STEPS", 3)
+    monkeypatch.setattr(pair_single, "STEPS", 5)
     parts = integrate(system, *begun(group, states, np.ones(3)), times, rtol=1e-9, atol=0.0, where="test")
     assert whole.steps == parts.steps
     np.testing.assert_allclose(parts.X, whole.X, rtol=0, atol=1e-13)
