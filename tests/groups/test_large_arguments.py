@@ -198,6 +198,20 @@ def test_every_size_is_as_good_as_doubles_allow(name: str, map_name: str) -> Non
         )
 
 
+@pytest.mark.parametrize("turns", [2, 10])
+@pytest.mark.parametrize("name", ["so4", "su3"])
+def test_near_their_poles_inverses_are_as_good_as_their_condition(name: str, turns: int) -> None:
+    """ad x has an eigenvalue close to 2 pi i turns."""
+    rng = np.random.default_rng(6)
+    for distance in (1e-2, 1e-5, 1e-9):
+        size = 2 * np.pi * turns * (1 + distance)
+        x, exact = point(name, "ljac_inv", size, rng), Exact(name, "ljac_inv", size)
+        expected = exact.floats(exact(exact.integers(x)))
+        assert np.max(np.abs(expected)) > 0.1 / distance
+        found = np.asarray(lc.build(group(name)).ljac_inv(x))
+        assert relative(found, expected) <= 20 * EPS * sensitivity(exact, x, expected, rng)
+
+
 def directional(exact: Exact, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The first and second derivative along v, by differences of 2^-100."""
     at, step = exact.integers(x), exact.integers(v) >> 100
