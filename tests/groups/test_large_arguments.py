@@ -219,8 +219,18 @@ def directional(exact: Exact, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray,
     return exact.floats(ahead - behind, 99), exact.floats(ahead - 2 * here + behind, 200)
 
 
-@pytest.mark.parametrize("map_name", MAPS)
-@pytest.mark.parametrize("name", ["su3", "so4", "sim3"])
+#: Those that compile and evaluate longest are slow: maps of the other side and groups of the other kind are in the default run.
+_LONG = {("so4", "rjac"), ("so4", "ljac_inv"), ("su3", "rjac")}
+
+
+@pytest.mark.parametrize(
+    ("name", "map_name"),
+    [
+        pytest.param(name, each, marks=[pytest.mark.slow] if (name, each) in _LONG else [])
+        for name in ("su3", "so4", "sim3")
+        for each in MAPS
+    ],
+)
 def test_derivatives_are_as_good(name: str, map_name: str) -> None:
     """Of CasADi's Function forward, in reverse and twice, and of compiled C, once and twice."""
     rng = np.random.default_rng(9)
