@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from lie_codegen.arrays import Array
 from lie_codegen.averaging.loop_orbit import loop_orbit
 from lie_codegen.averaging.orbit_kernels import formula_orbit_kernels, kernel_orbit_kernels
-from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, eigenvalues, found_orbit
+from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, found_orbit
 from lie_codegen.averaging.vector_field import read_formulas
 from lie_codegen.control.loop_result import ClosedLoop
 from lie_codegen.errors import InputError, NotFiniteError
@@ -25,6 +25,9 @@ from lie_codegen.runtime.ode import Motion
 from lie_codegen.runtime.rows import row_by_row
 from lie_codegen.shapes import shaped
 
+#: At an equilibrium of a driven system one step may be the period, while Df goes with t.
+_PANELS = 48
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orbit(Linearised, Saved):
@@ -34,11 +37,12 @@ class Orbit(Linearised, Saved):
         start: (n,) a point of it, at t = t0 where the system is driven.
         period: T.
         multipliers: (n,) eigenvalues of the monodromy matrix M(T), largest modulus first; of an autonomous orbit one of them
-            is 1, along the flow.
-        monodromy: (n, n) M(T).
+            is 1, along the flow. Each is known to 1e-9 of itself or so, however far below the others it lies.
+        exponents: (n,) log(multipliers) / T, imaginary parts in (-pi/T, pi/T]; known also where a multiplier is below 1e-308.
+        monodromy: (n, n) M(T), whose entries are known to rounding of the largest.
         autonomous: whether f does not depend on t, so that T was found too.
         residual: |y(T) - y(0)|.
-        liouville: |det M - exp int tr Df| over exp int tr Df: what the integration is good for.
+        liouville: |product of the multipliers - exp int tr Df| over exp int tr Df: what the integration is good for.
         mean_jacobian: (n, n) Df averaged along the orbit. Where f = eps g its eigenvalues are those of the averaged system
             to O(eps^2), beside `exponents`.
         kernels: rate, jacobian and variational, for lc.build and lc.generate.
@@ -47,6 +51,7 @@ class Orbit(Linearised, Saved):
     start: Array
     period: float
     multipliers: NDArray[np.complex128]
+    exponents: NDArray[np.complex128]
     monodromy: Array
     autonomous: bool
     residual: float
@@ -157,13 +162,22 @@ def _orbit(
     kernels: tuple[Kernel, ...], guess: Array, period: Any, driven: bool, section: Array | None, transient: bool
 ) -> Orbit:
     system = _system(kernels)
-    start, length, residual, monodromy = found_orbit(system, guess, period, driven, section, transient)
-    moments = np.arange(256) / 256 * length
-    jacobians = row_by_row(system.library.jacobian, system.motion(start, length).at(moments), moments)[0]
-    mean = jacobians.mean(axis=0)
-    volume = np.exp(length * float(np.trace(mean)))
-    liouville = abs(float(np.linalg.det(monodromy)) - volume) / volume
-    return Orbit(start, length, eigenvalues(monodromy), monodromy, not driven, residual, liouville, mean, kernels)
+    start, length, residual, monodromy, logs = found_orbit(system, guess, period, driven, section, transient)
+    motion = system.motion(start, length)
+    nodes, weights = _nodes(np.union1d(motion.t, np.linspace(0, length, _PANELS + 1)))
+    mean = np.tensordot(weights, row_by_row(system.library.jacobian, motion.at(nodes), nodes)[0], 1) / length
+    # the product of the multipliers, and exp int tr Df, may lie below every double: their ratio does not
+    liouville = abs(float(np.expm1(logs.real.sum() - length * np.trace(mean))))
+    return Orbit(
+        start, length, np.exp(logs), logs / length, monodromy, not driven, residual, liouville, mean, kernels
+    )  # fmt: skip
+
+
+def _nodes(t: Array) -> tuple[Array, Array]:
+    """Gauss' six nodes between any two of the times, and their weights: steps of the motion are short where Df changes fast."""
+    x, w = np.polynomial.legendre.leggauss(6)
+    half = np.diff(t)[:, None] / 2
+    return ((t[:-1, None] + half) + half * x).ravel(), (half * w).ravel()
 
 
 def _orbit_of_motion(average: AveragedMotion, guess: Any, period: Any, transient: bool, return_to: Any) -> Orbit:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lie_codegen.arrays import Array
-from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, eigenvalues, found_orbit
+from lie_codegen.averaging.orbit_newton import Linearised, OrbitSystem, found_orbit
 from lie_codegen.control.loop_flow import loop_flow
 from lie_codegen.control.loop_rate import columns, has_rate, loop_settle, moves_of
 from lie_codegen.control.loop_result import ClosedLoop, making_of
@@ -29,6 +29,7 @@ class LoopOrbit(Linearised, Saved):
         t0: the time of the reference, the law and the disturbance at which the period begins.
         period: T.
         multipliers: (k,) eigenvalues of the monodromy matrix, largest modulus first; of an autonomous loop one of them is 1.
+        exponents: (k,) their logarithms over T, imaginary parts in (-pi/T, pi/T].
         monodromy: (k, k) over a period, in (eta, the change of xi, the law's own vectors).
         autonomous: whether nothing in the loop depends on time, so that T was found too.
         residual: distance of the entries of the state after a period from those at the start.
@@ -40,6 +41,7 @@ class LoopOrbit(Linearised, Saved):
     t0: float
     period: float
     multipliers: NDArray[np.complex128]
+    exponents: NDArray[np.complex128]
     monodromy: Array
     autonomous: bool
     residual: float
@@ -82,7 +84,7 @@ def loop_orbit(run: ClosedLoop, period: Any, transient: bool) -> LoopOrbit:
         library, "state", len(start), numbers, float(run.t[-1]), lambda y: np.asarray(library.tangent(y)), moved
     )
     driven = _is_driven(system, start)
-    start, length, residual, monodromy = found_orbit(system, start, period, driven, None, transient)
+    start, length, residual, monodromy, logs = found_orbit(system, start, period, driven, None, transient)
     X, xi = loop.plant.split(start)
     place, states = sum(loop.plant.sizes[:2]), {}
     for each, value in zip(loop.own_ports, own, strict=True):
@@ -91,7 +93,7 @@ def loop_orbit(run: ClosedLoop, period: Any, transient: bool) -> LoopOrbit:
         states[each.port.name] = loop.plant.split(found)[0] if each.kind == "group" else found.reshape(value.shape)
         place += size
     return LoopOrbit(
-        X, xi, states, system.begin, length, eigenvalues(monodromy), monodromy, not driven, residual
+        X, xi, states, system.begin, length, np.exp(logs), logs / length, monodromy, not driven, residual
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ L holds the tangent directions at y by columns: the identity for vectors, X hat(
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.arrays import Array
+from lie_codegen.averaging.graded_product import log_eigenvalues
 from lie_codegen.errors import ComputationError, InputError, PeriodError
 from lie_codegen.exact.numbers import exact_number
 from lie_codegen.runtime.library import Library
@@ -27,6 +28,8 @@ _RTOL, _ATOL = 1e-13, 1e-15
 _RETURNS, _ITERATIONS = 40, 40
 #: |f| of a periodic orbit, relative to size / period, below which the point found is an equilibrium.
 _AT_REST = 1e-6
+#: A monodromy matrix of a larger condition number is taken in pieces: 1e-15 of its largest entry is 1e-11 of its least direction.
+_GRADED, _HALVINGS = 1e4, 24
 
 
 @dataclass(frozen=True)
@@ -81,19 +84,29 @@ class OrbitSystem:
         """(k, k): the columns at the end of a period in the directions there, which are those of the start."""
         return np.asarray(np.linalg.lstsq(self.tangent(y), columns, rcond=None)[0])
 
+    def factors(self, start: Array, length: float, monodromy: Array, halvings: int = _HALVINGS) -> list[Array]:
+        """The linearised flow over parts of the period, each well conditioned; their product is the monodromy matrix.
+
+        The tangent directions at the end of each part are those in which the next begins.
+        """
+        if not halvings or np.linalg.cond(monodromy) <= _GRADED:
+            return [monodromy]
+        here, found = start, []
+        for k in (0, 1):
+            part = replace(self, begin=self.begin + k * length / 2)
+            end, columns = part.flow(here, length / 2)
+            found += part.factors(here, length / 2, self.monodromy(end, columns), halvings - 1)
+            here = end
+        return found
+
 
 class Linearised:
     """What the linearisation of a periodic orbit over a period says; `Orbit` and `LoopOrbit` have it."""
 
     period: float
     multipliers: NDArray[np.complex128]
+    exponents: NDArray[np.complex128]
     autonomous: bool
-
-    @property
-    def exponents(self) -> NDArray[np.complex128]:
-        """(k,) log(multipliers) / T, imaginary parts in (-pi/T, pi/T]; a real part of -infinity is a multiplier of 0."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.log(self.multipliers) / self.period)
 
     @cached_property
     def trivial(self) -> int | None:
@@ -112,16 +125,10 @@ class Linearised:
         return bool(np.all(np.abs(others) < 1))
 
 
-def eigenvalues(monodromy: Array) -> NDArray[np.complex128]:
-    """Multipliers in the order of `Linearised`."""
-    values = np.linalg.eigvals(monodromy).astype(complex)
-    return np.asarray(values[np.lexsort((-values.imag, -np.abs(values).round(12)))])
-
-
 def found_orbit(
     system: OrbitSystem, start: Array, period: Any, driven: bool, section: Array | None, transient: bool
-) -> tuple[Array, float, float, Array]:
-    """(start, T, residual, monodromy) of the orbit near a start.
+) -> tuple[Array, float, float, Array, NDArray[np.complex128]]:
+    """(start, T, residual, monodromy, logarithms of the multipliers) of the orbit near a start.
 
     Raises:
         PeriodError: a driven system without a period, or with one that is not its own.
@@ -135,7 +142,8 @@ def found_orbit(
     else:
         start, length = _first_return(system, start, section, None if period is None else _period(period), transient)
         start, length, residual, columns = _newton_free(system, start, length)
-    return start, length, residual, system.monodromy(start, columns)
+    monodromy = system.monodromy(start, columns)
+    return start, length, residual, monodromy, log_eigenvalues(system.factors(start, length, monodromy))
 
 
 def _period(period: Any) -> float:

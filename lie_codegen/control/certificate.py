@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from lie_codegen.arrays import Array
 from lie_codegen.control.certificate_constants import Metric, hessian_bound, quadratic_bounds
 from lie_codegen.control.certificate_proofs import UNPROVED, proved_constants, status_of
-from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNumbers, overshoot_of
+from lie_codegen.control.certificate_rates import PointwiseRate, Rate, TheoremNumbers, largest_epsilon, overshoot_of
 from lie_codegen.control.certificate_record import Certificate, loop_state
 from lie_codegen.control.claims import check_constant, is_claimed
 from lie_codegen.control.compatibility import check_compatibility
@@ -70,7 +70,7 @@ def certificate(
         state: (X, xi, X_d, xi_d) instead of a level: the level is W there.
         speed: the largest |nu|_I of the reference velocity, transported.
         overshoot: the largest k that is allowed: the rate is the best under it. Without it the best rate comes with a k of 5 to 8.
-        epsilon: of the cross term, instead of the best.
+        epsilon: of the cross term, instead of the best; below sqrt(2 b_2), or where k is `overshoot`.
         reach: the largest entry of X_d and its inverse, where phi is not left-invariant and the group not compact; 2 if not given.
         prove: whether b_1, b_2, h and t are also bounded by interval arithmetic where that is known how: phi = tr(K (1 - R_d^T R))/2 on SO(3).
         limits, sample, delay: of a loop that clips, samples or delays its force: refused, as the proof is void there.
@@ -121,6 +121,7 @@ def certificate(
     if epsilon is None:
         best = pointwise.best(overshoot)
     else:
+        _check_epsilon(float(epsilon), b_2, overshoot)
         best = Rate(float(epsilon), pointwise.at(float(epsilon), starts=6), overshoot_of(float(epsilon), b_2))
     proved = proved_constants(pair, gains, metric, level, (b_1, b_2, h, t)) if prove else UNPROVED
     stated, sure = _rates_of_theorem(theorem, feedforward, proved, overshoot)
@@ -131,6 +132,16 @@ def certificate(
         share, _largest_slopes(search), _rate_near_rest(metric, stiffness, K_d), points,
         status_of(pair, points, proved, len(search.places.X)),
     )  # fmt: skip
+
+
+def _check_epsilon(epsilon: float, b_2: float, overshoot: float | None) -> None:
+    """Refuse a cross term with which W_total + eps d phi . xi_e is no Lyapunov function, or overshoots by more than was allowed."""
+    high = largest_epsilon(b_2, overshoot)
+    if not 0 < epsilon < high:
+        why = "sqrt(2 b_2), where W_total + eps d phi . xi_e stops being positive"
+        if overshoot is not None:
+            why = f"which has the overshoot {overshoot:g}"
+        raise InputError(f"certificate: epsilon = {epsilon:g} must lie between 0 and {high:.6g}, {why}")
 
 
 def _refuse_other_loops(**given: Any) -> None:

@@ -47,6 +47,41 @@ def test_the_second_multiplier_is_liouvilles(mu):
     np.testing.assert_allclose(orbit.multipliers[1].real, np.exp(end[2]), rtol=1e-8, atol=1e-12)
 
 
+@pytest.mark.parametrize("mu", [5.0, 20.0])
+def test_a_multiplier_far_below_rounding_is_known(mu):
+    """1e-37 and, at mu = 20, below every double: exp int tr Df by SciPy again, where the monodromy matrix holds rounding alone."""
+    orbit = lc.floquet(PENDULUM, variables=("x", "v"), guess=(2, 0), parameters={"mu": mu})
+
+    def f(t, y):
+        return [y[1], -y[0] + mu * (1 - y[0] ** 2) * y[1], mu * (1 - y[0] ** 2)]
+
+    end = solve_ivp(f, (0, orbit.period), [*orbit.start, 0], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    assert orbit.exponents[1] == pytest.approx(end[2] / orbit.period, rel=1e-7)
+    assert orbit.multipliers[1] == pytest.approx(np.exp(end[2]), rel=1e-6, abs=0)
+    assert orbit.trivial_error < 1e-10
+    assert orbit.liouville < 1e-8
+
+
+@pytest.mark.parametrize("rates", [(0.1, -1, -1.1, -5), (0.05, -30, -60), (-0.1, -0.2, -8, -8.05, -8.1, -20)])
+def test_exponents_of_any_spread_come_back(rates):
+    """A linear system with these exponents in skew directions, driven so that its orbit is not at rest; and with turning pairs."""
+    n = len(rates)
+    skew = np.random.default_rng(0).integers(-3, 4, size=(n, n)) + 4 * np.eye(n)
+    turning = np.diag(np.array(rates, dtype=float))
+    turning[-2:, -2:] = [[rates[-1], 0.3], [-0.3, rates[-1]]]
+    for core, expected in (
+        (np.diag(rates), np.array(rates, dtype=complex)),
+        (turning, np.array([*rates[:-2], rates[-1] + 0.3j, rates[-1] - 0.3j])),
+    ):
+        whole = skew @ core @ np.linalg.inv(skew)
+        names = [f"y{i}" for i in range(n)]
+        formulas = [
+            " + ".join(f"({a:.17g})*{name}" for a, name in zip(row, names, strict=True)) + " + sin(t)" for row in whole
+        ]
+        orbit = lc.floquet(formulas, names, np.zeros(n), period="2*pi")
+        np.testing.assert_allclose(orbit.exponents, expected, atol=1e-9)
+
+
 def test_duffing_published_and_by_differences():
     rates = ["v", "-0.2*v - x - x^3 + 0.5*cos(1.4*t)"]
     orbit = lc.floquet(rates, variables=("x", "v"), guess=(0.8, 1.3), period="2*pi/1.4")

@@ -104,6 +104,12 @@ def test_overshoot_is_traded_for_rate() -> None:
     assert bounded.rate == pytest.approx(0.546, rel=1e-3)
     with pytest.raises(InputError, match="overshoot"):
         found(level=4.5, overshoot=0.9)
+    edge = np.sqrt(2 * bounded.b_2)  # where |eps d phi . xi_e| <= eps/sqrt(2 b_2) W_total reaches W_total
+    for epsilon in (50.0, 1.001 * edge, 0.0, -0.1, np.nan):
+        with pytest.raises(InputError, match="stops being positive"):
+            found(level=4.5, epsilon=epsilon)
+    with pytest.raises(InputError, match="has the overshoot"):
+        found(level=4.5, epsilon=1.001 * edge * 1.6 / 3.6, overshoot=2.6)
 
 
 def test_inside_has_three_values() -> None:
