@@ -28,6 +28,8 @@ _RTOL, _ATOL = 1e-13, 1e-15
 _RETURNS, _ITERATIONS = 40, 40
 #: |f| of a periodic orbit, relative to size / period, below which the point found is an equilibrium.
 _AT_REST = 1e-6
+#: A component that goes less far than this part of the largest need not return by itself.
+_SMALL = 1e-6
 #: A monodromy matrix of a larger condition number is taken in pieces: 1e-15 of its largest entry is 1e-11 of its least direction.
 _GRADED, _HALVINGS = 1e4, 24
 
@@ -254,7 +256,9 @@ def _first_return(
         if motion.status != EVENT:
             break
         end, length = motion.y[-1], float(motion.t[-1])
-        gap = float(np.linalg.norm(end - now)) / max(float(np.abs(motion.y - end).max()), 1e-300)
+        # each component by how far it goes: of a relaxation oscillation the velocity would hide what x still misses
+        reach = np.abs(motion.y - end).max(axis=0)
+        gap = float(np.max(np.abs(end - now) / np.maximum(reach, max(_SMALL * float(reach.max()), 1e-300))))
         if best is None or gap < best[0]:
             best = gap, end, length
         now = end

@@ -62,6 +62,19 @@ def test_a_multiplier_far_below_rounding_is_known(mu):
     assert orbit.liouville < 1e-8
 
 
+def test_a_relaxation_oscillation_is_found_from_a_rough_guess():
+    """The first return from (2, 0) at mu = 50 takes 82.29 instead of 82.51; the components differ by a factor of 33 in size."""
+    orbit = lc.floquet(PENDULUM, variables=("x", "v"), guess=(2, 0), parameters={"mu": 50.0})
+
+    def f(t, y):
+        return [y[1], -y[0] + 50 * (1 - y[0] ** 2) * y[1]]
+
+    end = solve_ivp(f, (0, orbit.period), orbit.start, method="Radau", rtol=1e-10, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(end, orbit.start, atol=1e-6)
+    assert orbit.residual < 1e-10
+    assert orbit.stable
+
+
 @pytest.mark.parametrize("rates", [(0.1, -1, -1.1, -5), (0.05, -30, -60), (-0.1, -0.2, -8, -8.05, -8.1, -20)])
 def test_exponents_of_any_spread_come_back(rates):
     """A linear system with these exponents in skew directions, driven so that its orbit is not at rest; and with turning pairs."""
