@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 import toy_kernels
 
+import lie_codegen as lc
 from lie_codegen.codegen.generate import generate
 from lie_codegen.codegen.package import render_library, render_package
 from lie_codegen.codegen.templates import environment, template_folder
@@ -106,6 +107,17 @@ def test_header_serves_cpp(folder: Path) -> None:
     run("gcc", "-c", "-Iinclude", "src/toy.c", "-o", "toy.o", cwd=folder)
     run("g++", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Iinclude", "use.cpp", "toy.o", "-o", "use", cwd=folder)
     run("./use", cwd=folder)
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_sources_are_cpp_too(real: str, tmp_path: Path) -> None:
+    """Calls of routines passed compound literals, which C++ has not: no package with a logarithm compiled as C++."""
+    for name in ("so3", "sim2", "su3"):
+        folder = lc.generate(lc.group_kernels(name), tmp_path / name, real=real)
+        flags = ("-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Iinclude")
+        run("g++", *flags, "example.c", f"src/{name}.c", "-lm", "-o", "use", cwd=folder)
+        run("./use", cwd=folder)
 
 
 @pytest.mark.skipif(shutil.which("nm") is None or not COMPILERS, reason="needs nm")

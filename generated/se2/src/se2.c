@@ -635,7 +635,8 @@ void se2_log(const double X[9], double x[3])
     const double t39 = (double)(t37 < 0.5);
     double t40[3] = {0};
     if (t39 != 0) {
-        se2_log_checked((const double[9]){t0, t1, t2, t3, t4, t5, t6, t7, t8}, t40);
+        const double t40_of[9] = {t0, t1, t2, t3, t4, t5, t6, t7, t8};
+        se2_log_checked(t40_of, t40);
     }
     const double t41 = t40[0];
     const double t42 = t40[1];

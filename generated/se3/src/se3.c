@@ -1321,7 +1321,8 @@ void se3_log(const double X[16], double x[6])
     const double t169 = (double)(t167 < 0.5);
     double t170[6] = {0};
     if (t169 != 0) {
-        se3_log_checked((const double[16]){t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15}, t170);
+        const double t170_of[16] = {t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15};
+        se3_log_checked(t170_of, t170);
     }
     const double t171 = t170[0];
     const double t172 = t170[1];

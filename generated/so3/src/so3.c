@@ -787,7 +787,8 @@ void so3_log(const double X[9], double x[3])
     const double t153 = (double)(t151 < 0.5);
     double t154[3] = {0};
     if (t153 != 0) {
-        so3_log_checked((const double[9]){t0, t1, t2, t3, t4, t5, t6, t7, t8}, t154);
+        const double t154_of[9] = {t0, t1, t2, t3, t4, t5, t6, t7, t8};
+        so3_log_checked(t154_of, t154);
     }
     const double t155 = t154[0];
     const double t156 = t154[1];
