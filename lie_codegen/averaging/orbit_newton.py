@@ -30,8 +30,9 @@ _RETURNS, _ITERATIONS = 40, 40
 _AT_REST = 1e-6
 #: A component that goes less far than this part of the largest need not return by itself.
 _SMALL = 1e-6
-#: A monodromy matrix of a larger condition number is taken in pieces: 1e-15 of its largest entry is 1e-11 of its least direction.
-_GRADED, _HALVINGS = 1e4, 24
+#: A monodromy matrix is taken in pieces where its least direction is below this part of 1, the start, or of its largest: the flow
+#: knows 1e-15 of these, 1e-11 of that direction.
+_GRADED, _HALVINGS = 1e-4, 24
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,8 @@ class OrbitSystem:
 
         The tangent directions at the end of each part are those in which the next begins.
         """
-        if not halvings or np.linalg.cond(monodromy) <= _GRADED:
+        sizes = np.linalg.svd(monodromy, compute_uv=False)
+        if not halvings or sizes[-1] >= _GRADED * max(1.0, sizes[0]):
             return [monodromy]
         here, found = start, []
         for k in (0, 1):
@@ -266,7 +268,7 @@ def _first_return(
             break
     if best is None:
         last = motion.y[-1]
-        at_rest = float(np.linalg.norm(system.rate(last, 0.0))) < 1e-6 * speed
+        at_rest = float(np.abs(system.rate(last, 0.0)).max()) < 1e-6 * speed
         if again and transient and not at_rest and np.all(np.isfinite(last)) and motion.status == REACHED:
             # the guess lies off the orbit's reach: what the motion has come to is a better one
             return _first_return(system, last, section, None, transient, again=False)

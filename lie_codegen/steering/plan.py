@@ -34,7 +34,7 @@ _ROUNDING = 1e-9
 class Status(Enum):
     """How a plan ended; the value says what it means for the user."""
 
-    SOLVED = "solved: the endpoint error is below the tolerance"
+    SOLVED = "solved: the end and every condition are met to the tolerance"
     APPROXIMATE = "approximate: the method reaches the target up to its own order; see .error"
     LOCAL = "solved: a local minimum of the objective, the best of the starts tried; more starts may find a better one"
     EXTREMAL = (

@@ -62,6 +62,19 @@ def test_a_multiplier_far_below_rounding_is_known(mu):
     assert orbit.liouville < 1e-8
 
 
+def test_a_contraction_of_everything_is_known():
+    """x' = -300 x + cos t: one multiplier, exp(-600 pi) = 1e-819, which no double holds."""
+    orbit = lc.floquet(["-300*x + cos(t)"], ("x",), (0.0,), period="2*pi")
+    assert orbit.exponents[0] == pytest.approx(-300, rel=1e-11)
+    assert orbit.liouville < 1e-8
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_motion_that_leaves_is_refused_by_name():
+    with pytest.raises(ComputationError, match="does not return"):
+        lc.floquet(["x", "y"], ("x", "y"), (1.0, 1.0))
+
+
 def test_a_relaxation_oscillation_is_found_from_a_rough_guess():
     """The first return from (2, 0) at mu = 50 takes 82.29 instead of 82.51; the components differ by a factor of 33 in size."""
     orbit = lc.floquet(PENDULUM, variables=("x", "v"), guess=(2, 0), parameters={"mu": 50.0})
