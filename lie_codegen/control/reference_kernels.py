@@ -30,6 +30,7 @@ from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec
+from lie_codegen.kernel.table_rows import row_at
 
 if TYPE_CHECKING:
     from lie_codegen.control.plan_reference import Planned, PlanOnGroup
@@ -127,25 +128,21 @@ def _segment(
     ops: Arithmetic, t: Scalar, reference: WaypointReference
 ) -> tuple[Scalar, Scalar, list[Vector], list[list[Any]]]:
     """Start, duration, (n, 6) coefficients and first waypoint of the segment that holds t."""
-    starts, n = reference.times[:-1], reference.group.dim
-    later = [ops.less(float(start), t) for start in starts[1:]]
-
-    def chosen(values: NDArray[Any]) -> Scalar:
-        result: Scalar = float(values[0])
-        for condition, value in zip(later, values[1:], strict=True):
-            if any(other != values[0] for other in values):
-                result = ops.where(condition, float(value), result)
-        return result
-
-    spans = np.diff(reference.times)
-    table = [[chosen(reference.coefficients[:, m, k]) for m in range(6)] for k in range(n)]
-    X = reference.elements[:-1]
-    size = range(reference.group.degree)
-    if reference.group.is_complex:
-        element = [[Complex(chosen(X[:, i, j].real), chosen(X[:, i, j].imag)) for j in size] for i in size]
-    else:
-        element = [[chosen(X[:, i, j]) for j in size] for i in size]
-    return chosen(starts), chosen(spans), table, element
+    group, starts, X = reference.group, reference.times[:-1], reference.elements[:-1]
+    count, n, d = len(starts), group.dim, group.degree
+    parts = [X.real, X.imag] if group.is_complex else [X]
+    columns = [
+        starts[:, None],
+        np.diff(reference.times)[:, None],
+        np.moveaxis(reference.coefficients, 1, 2).reshape(count, -1),
+    ]
+    rows = np.concatenate([*columns, *(part.reshape(count, -1) for part in parts)], axis=1)
+    start, span, *rest = row_at(ops, t, starts, np.ascontiguousarray(rows, dtype=float))
+    table = [rest[6 * k : 6 * k + 6] for k in range(n)]
+    entries = rest[6 * n :]
+    if group.is_complex:
+        entries = [Complex(re, im) for re, im in zip(entries[: d * d], entries[d * d :], strict=True)]
+    return start, span, table, [entries[d * i : d * i + d] for i in range(d)]
 
 
 def _from_left(ops: Arithmetic, start: NDArray[Any] | None, X: Matrix) -> Any:
