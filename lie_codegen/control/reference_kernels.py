@@ -225,7 +225,7 @@ def reference(
         duration: with a plan without drift: the time [s] it takes, from rest to rest, X_d(t) = X(s(t)) with quintics s that stop
             wherever the plan's controls jump: nothing is rounded off.
         times, waypoints: (k,) and (k, d, d), instead of formulas; at rest at both ends.
-        samples: (k, d, d) of a smooth curve at the times, in the place of waypoints: velocities and accelerations are those of
+        samples: (k, d, d), 5 to 1024 of a smooth curve at the times, in the place of waypoints: velocities and accelerations are those of
             polynomials through five neighbours.
         start: (d, d) for formulas.
         smoothing: for a plan: the time before and after a jump of the controls in which it is rounded off [s]; a hundredth of the
