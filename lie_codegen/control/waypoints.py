@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lie_codegen.control.reference_motion import WaypointReference
 from lie_codegen.errors import InputError, ShapeError
+from lie_codegen.groups.build import library_of
 from lie_codegen.groups.derivation import GroupDerivation, derivation_of
 from lie_codegen.groups.maps.admission import admitted
 from lie_codegen.groups.maps.checked_log import log_coordinates
@@ -24,6 +25,8 @@ from lie_codegen.kernel.numpy_arithmetic import NumpyArithmetic
 
 #: How far a waypoint may lie off the group, relative to its size.
 _ON_GROUP = 1e-8
+#: A turn beyond is as short the other way round.
+_SHORT_WAY = np.pi * (1 - 1e-9)
 
 
 @record_factory(times=doubles, waypoints=doubles)
@@ -80,6 +83,20 @@ def _relative_log(derivation: GroupDerivation, X: NDArray[Any], Y: NDArray[Any],
     )
 
 
+def _relative_logs(derivation: GroupDerivation, X: NDArray[Any], pairs: Sequence[tuple[int, int]]) -> NDArray[Any]:
+    """log(X_i^-1 X_j) of many pairs by compiled code; those that it has none of are refused as `_relative_log` does."""
+    library, (first, second) = library_of(derivation.group), np.transpose(pairs)
+    relative = np.linalg.solve(X[first], X[second])
+    x = np.asarray(library.log.batch(relative))
+    off = np.max(np.abs(np.asarray(library.exp.batch(x)) - relative), axis=(1, 2), initial=0.0)
+    turn = np.max(np.abs(np.linalg.eigvals(derivation.group.hat(np.nan_to_num(x))).imag), axis=1)
+    good = (off <= _ON_GROUP * np.maximum(1.0, np.max(np.abs(relative), axis=(1, 2)))) & (turn <= _SHORT_WAY)
+    for k in np.flatnonzero(~good):
+        i, j = pairs[int(k)]
+        x[k] = _relative_log(derivation, X[i], X[j], min(i, j))
+    return x
+
+
 def logarithm(derivation: GroupDerivation, X: NDArray[Any]) -> NDArray[Any] | None:
     """The x with exp(hat(x)) = X, or None where the principal logarithm is not in the algebra."""
     ops = FloatArithmetic()
@@ -89,8 +106,8 @@ def logarithm(derivation: GroupDerivation, X: NDArray[Any]) -> NDArray[Any] | No
     except (ArithmeticError, ValueError):
         return None
     turn = float(np.max(np.abs(np.linalg.eigvals(derivation.group.hat(x)).imag)))
-    if turn > np.pi * (1 - 1e-9):
-        return None  # the other way round is as short
+    if turn > _SHORT_WAY:
+        return None
     return x if off <= _ON_GROUP * max(1.0, float(np.max(np.abs(X)))) else None
 
 
@@ -173,14 +190,15 @@ def sampled_reference(group: MatrixGroup, times: ArrayLike, samples: ArrayLike) 
         )
     derivation = derivation_of(group)
     speed, bend = np.empty((2, len(t), group.dim))
-    for i in range(len(t)):
-        first = min(max(i - 2, 0), len(t) - 5)
-        near = [j for j in range(first, first + 5) if j != i]
-        moves = np.array([_relative_log(derivation, X[i], X[j], min(i, j)) for j in near])
+    firsts = [min(max(i - 2, 0), len(t) - 5) for i in range(len(t))]
+    neighbours = [[j for j in range(first, first + 5) if j != i] for i, first in enumerate(firsts)]
+    all_moves = _relative_logs(derivation, X, [(i, j) for i, near in enumerate(neighbours) for j in near])
+    for i, near in enumerate(neighbours):
+        moves = all_moves[4 * i : 4 * i + 4]
         width = float(np.max(np.abs(t[near] - t[i])))
         powers = ((t[near] - t[i]) / width)[:, None] ** np.arange(1, 5)
         fit = np.linalg.solve(powers, moves)
         speed[i], bend[i] = fit[0] / width, 2 * fit[1] / width**2
-    moves = np.array([_relative_log(derivation, X[i], X[i + 1], i) for i in range(len(t) - 1)])
+    moves = _relative_logs(derivation, X, [(i, i + 1) for i in range(len(t) - 1)])
     table = quintics(derivation, moves, speed[:-1], speed[1:], np.diff(t), (bend[:-1], bend[1:]))
     return WaypointReference(group, t, X, table)

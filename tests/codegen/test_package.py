@@ -110,7 +110,7 @@ def test_header_serves_cpp(folder: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
-@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("real", ["double", pytest.param("float", marks=pytest.mark.slow)])
 def test_sources_are_cpp_too(real: str, tmp_path: Path) -> None:
     """Calls of routines passed compound literals, which C++ has not: no package with a logarithm compiled as C++."""
     for name in ("so3", "sim2", "su3"):

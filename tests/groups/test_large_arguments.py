@@ -169,8 +169,15 @@ def sizes(name: str, map_name: str) -> tuple[int, ...]:
     return (5, 14, 30, 100) if name not in COMPACT and "inv" in map_name else SIZES
 
 
+#: Of these one Jacobian, the inverse, is in the default run.
+_SLOW = ("su3 in another basis", "so4 x so3", "so31", "sl3")
 #: The Jacobians of gl3 are those of sl3, and those of su4 have 225 entries.
-CASES = [(name, m) for name in GROUPS for m in MAPS if m == "exp" or name not in ("gl3", "su4")]
+CASES = [
+    pytest.param(name, m, marks=[pytest.mark.slow] if m == "rjac" and name in _SLOW else [])
+    for name in GROUPS
+    for m in MAPS
+    if m == "exp" or name not in ("gl3", "su4")
+]
 
 
 @pytest.mark.parametrize(("name", "map_name"), CASES)
@@ -220,7 +227,7 @@ def directional(exact: Exact, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray,
 
 
 #: Those that compile and evaluate longest are slow: maps of the other side and groups of the other kind are in the default run.
-_LONG = {("so4", "rjac"), ("so4", "ljac_inv"), ("su3", "rjac")}
+_LONG = {("so4", "exp"), ("so4", "rjac"), ("so4", "ljac_inv"), ("su3", "rjac"), ("sim3", "rjac")}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from lie_codegen.codegen.vectors import make_vectors
 from lie_codegen.kernel.arithmetic import FloatArithmetic
 
 
-@pytest.mark.parametrize("name", ["so4", "so31", "sp4", "sl3"])
+@pytest.mark.parametrize("name", ["so4", "so31", pytest.param("sp4", marks=pytest.mark.slow), "sl3"])
 def test_products_of_exponentials(name: str) -> None:
     """Newton's form over complex nodes: its symmetric sums took minutes on so31, and equal nodes were told apart on so4."""
     group = generic_basis(lc.group(name), np.random.default_rng(5))
@@ -35,7 +35,7 @@ def test_elements_of_the_vectors_have_logarithms(name: str, real: str) -> None:
         assert all(np.isfinite(vector.outputs[0]).all() for vector in make_vectors(log, real=real))
 
 
-@pytest.mark.parametrize("name", ["se_2_3", "sgal3"])
+@pytest.mark.parametrize("name", ["se_2_3", pytest.param("sgal3", marks=pytest.mark.slow)])
 def test_jacobians_of_screws(name: str) -> None:
     """Exact polynomials in factors are short in the usual basis; in this one they grew until the derivation took minutes."""
     group = generic_basis(lc.group(name), np.random.default_rng(1))
@@ -51,7 +51,7 @@ def test_jacobians_of_screws(name: str) -> None:
     assert np.max(np.abs(np.array(J, dtype=float) - wanted)) < 1e-13 * np.max(np.abs(wanted))
 
 
-@pytest.mark.parametrize("name", ["sl3", "sp4"])
+@pytest.mark.parametrize("name", ["sl3", pytest.param("sp4", marks=pytest.mark.slow)])
 def test_wei_norman_where_adjoint_spectra_are_involved(name: str) -> None:
     """The roots of ad_k span fields of degree 6 and 16: Sp(4) and SO(5) were refused, SU(3) took minutes."""
     group = generic_basis(lc.group(name), np.random.default_rng(1))
