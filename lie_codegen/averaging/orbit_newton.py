@@ -33,6 +33,8 @@ _SMALL = 1e-6
 #: A monodromy matrix is taken in pieces where its least direction is below this part of 1, the start, or of its largest: the flow
 #: knows 1e-15 of these, 1e-11 of that direction.
 _GRADED, _HALVINGS = 1e-4, 24
+#: Growth in a period from which the last bit of a start misses the return by more than Newton's method ends with, 1e-10.
+_HOPELESS = 1e6
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,7 @@ def _newton_driven(system: OrbitSystem, start: Array, length: float) -> tuple[Ar
         best = min(best, residual)
         move = np.linalg.lstsq(columns - system.tangent(start), start - end, rcond=1e-12)[0]
         start, end, columns = _shortened(system, start, move, length, 0.0, residual)[:3]
-    raise ComputationError(_unconverged(residual))
+    raise ComputationError(_unconverged(residual, columns))
 
 
 def _newton_free(system: OrbitSystem, start: Array, length: float) -> tuple[Array, float, float, Array]:
@@ -200,7 +202,7 @@ def _newton_free(system: OrbitSystem, start: Array, length: float) -> tuple[Arra
             move, longer = move * (0.3 * length / abs(longer)), np.sign(longer) * 0.3 * length
         start, end, columns, length = _shortened(system, start, move, length, longer, residual)
         _check_moving(system, start, length)
-    raise ComputationError(_unconverged(residual))
+    raise ComputationError(_unconverged(residual, columns))
 
 
 def _shortened(
@@ -280,5 +282,12 @@ def _first_return(
     return best[1], best[2]
 
 
-def _unconverged(residual: float) -> str:
-    return f"floquet: Newton's method did not converge (the motion misses its start by {residual:.1e}); give a nearer guess"
+def _unconverged(residual: float, columns: Array) -> str:
+    missed = f"floquet: Newton's method did not converge (the motion misses its start by {residual:.1e}"
+    growth = float(np.linalg.norm(columns, 2)) if np.all(np.isfinite(columns)) else np.inf
+    if growth > _HOPELESS:
+        return (
+            f"{missed}, where errors grow {growth:.1e} times in a period): give a nearer guess; if the orbit itself is so unstable, doubles hold no "
+            "start that returns: look for the orbit of the motion backward in time"
+        )
+    return f"{missed}); give a nearer guess"

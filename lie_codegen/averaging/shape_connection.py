@@ -78,6 +78,9 @@ def connection(group: GroupLike, *, shape: Sequence[str], A: Any = None, metric:
         A: (n, k) formulas in them, TR 93-59, (68) with C = -A and (70); or
         metric: (n + k, n + k) formulas of the quadratic form of (xi, r'), kinetic energy or drag power: A = M_11^-1 M_12.
 
+    Returns:
+        The connection: `.average(...)` of a gait, `.best_frame(...)`, `.kernels()`.
+
     Raises:
         InputError: both or neither, a metric that is not symmetric, a formula that is not analytic (abs, atan2).
         ShapeError: another shape.

@@ -161,6 +161,10 @@ def observer(
         reduced: take vectors that do not determine the state, as one direction: the heading is then not observed.
         name: C identifier.
 
+    Returns:
+        The observer: `.kernel` of one step, `.A` and `.poles` of its linear error, `.covariance(step=, direction_noise=)`, `.directions`; it goes into
+        `lc.closed_loop(observer=)`.
+
     Raises:
         ShapeError, InputError: vectors or weights that do not fit; vectors that do not determine the state.
     """

@@ -18,7 +18,8 @@ from lie_codegen.rigid_body.torques import STATE, Torque
 
 
 class torque:  # noqa: N801
-    """Torques of the environment: gravity_gradient, solar_pressure, drag, eddy_current, residual_dipole, formula.
+    """Torques of the environment: gravity_gradient(position, mu), solar_pressure(body, sun, pressure), drag(body, velocity, pressure),
+    eddy_current(M, field), residual_dipole(m, field), formula(formulas).
 
     A direction (position, sun, velocity, field) is inertial: three numbers, three formulas in t and the parameters, or a
     function of t. Of `sun` and `velocity` only the direction counts, the size is in the pressure; a field keeps its size, and a

@@ -148,6 +148,10 @@ def free_rotation(J: Any, X: ArrayLike, omega: ArrayLike) -> FreeRotation:
         X: (3, 3) body to inertial at t = 0, or (..., 3, 3).
         omega: (3,) [rad/s] in body axes, or (..., 3); batches broadcast.
 
+    Returns:
+        The motion: `.X(t)` and `.omega(t)` at any times, `.k`, `.mode`, `.energy`, `.dynamic_inertia`, `.nutation_period`, `.precession_rate`,
+        `.geometric_phase`, `.kernels()` for C. A body whose moments differ by less than 1e-9 of themselves turns as a sphere: an error that grows with t.
+
     Raises:
         InputError: an inertia of no body; a motion exactly on the separatrix, whose period is infinite.
         NotOnGroupError: X is no rotation (to 1e-5; within that the nearest one is taken).

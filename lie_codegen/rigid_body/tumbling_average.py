@@ -157,6 +157,10 @@ def tumbling_average(J: Any, torques: Sequence[Torque]) -> TumblingAverage:
         J: three moments [kg m^2] or a 3 x 3 matrix, in the user's axes.
         torques: of lc.torque: gravity_gradient, solar_pressure, drag, eddy_current, residual_dipole, formula.
 
+    Returns:
+        The averaged body: `.rate(X, omega)`, the mean rates of H and D; `.solve(X, omega, t)`, the averaged run; `.direct(X, omega, t)`, the
+        unaveraged one; `.equilibrium(X, omega)`, `.slow_flow(X, omega)`.
+
     Raises:
         InputError: an inertia of no body, something that is no torque.
 

@@ -228,3 +228,11 @@ def test_refusals():
 def test_an_orbit_is_a_value(tmp_path):
     orbit = lc.floquet(PENDULUM, ("x", "v"), (2, 0), parameters={"mu": 0.5})
     assert lc.load(orbit.save(tmp_path / "orbit.npz")) == orbit
+
+
+def test_an_orbit_that_doubles_cannot_hold_is_said_to_be_one() -> None:
+    """x' = 12 x + cos t multiplies errors by e^75 in a period: no guess helps, and backward in time the orbit is found."""
+    with pytest.raises(ComputationError, match="backward in time"):
+        lc.floquet(["12*x + cos(t)"], ("x",), (0.0,), period="2*pi")
+    back = lc.floquet(["-12*x - cos(t)"], ("x",), (0.0,), period="2*pi")
+    np.testing.assert_allclose(back.exponents, [-12], rtol=1e-10)
