@@ -30,7 +30,7 @@ from lie_codegen.kernel.dual import DualArithmetic, tangent_of, value_of
 from lie_codegen.kernel.expressions import ExpressionEvaluator
 from lie_codegen.kernel.kernel import Kernel, Port
 from lie_codegen.kernel.linear import Matrix, Vector, matvec
-from lie_codegen.kernel.table_rows import row_at
+from lie_codegen.kernel.table_rows import TimeTable
 
 if TYPE_CHECKING:
     from lie_codegen.control.plan_reference import Planned, PlanOnGroup
@@ -75,6 +75,8 @@ class ReferenceBody:
         self.reference = reference
         self.derivation = derivation_of(reference.group)
         self.data = derivation_of(reference.group).wei_norman
+        if not isinstance(reference, FormulaReference):
+            self._table = _segments(reference)
 
     def __call__(self, ops: Arithmetic, t: Scalar) -> tuple[Any, Vector, Vector]:
         if isinstance(self.reference, FormulaReference):
@@ -94,7 +96,12 @@ class ReferenceBody:
         return X, [value_of(x, dual.level) for x in xi], [tangent_of(x, 0, dual.level) for x in xi]
 
     def _waypoints(self, ops: Arithmetic, t: Scalar, reference: WaypointReference) -> tuple[Any, Vector, Vector]:
-        start, span, table, element = _segment(ops, t, reference)
+        n, d = reference.group.dim, reference.group.degree
+        start, span, *rest = self._table.at(ops, t)
+        table, entries = [rest[6 * k : 6 * k + 6] for k in range(n)], rest[6 * n :]
+        if reference.group.is_complex:
+            entries = [Complex(re, im) for re, im in zip(entries[: d * d], entries[d * d :], strict=True)]
+        element = [entries[d * i : d * i + d] for i in range(d)]
         s = (t - start) / span
         inside = ops.where(ops.less(s, 0), 0, ops.where(ops.less(1, s), 1, s))
         p = [_horner(row, inside, 0) for row in table]
@@ -124,25 +131,13 @@ def _horner(coefficients: Sequence[Scalar], s: Scalar, derivative: int) -> Scala
     return value
 
 
-def _segment(
-    ops: Arithmetic, t: Scalar, reference: WaypointReference
-) -> tuple[Scalar, Scalar, list[Vector], list[list[Any]]]:
-    """Start, duration, (n, 6) coefficients and first waypoint of the segment that holds t."""
-    group, starts, X = reference.group, reference.times[:-1], reference.elements[:-1]
-    count, n, d = len(starts), group.dim, group.degree
-    parts = [X.real, X.imag] if group.is_complex else [X]
-    columns = [
-        starts[:, None],
-        np.diff(reference.times)[:, None],
-        np.moveaxis(reference.coefficients, 1, 2).reshape(count, -1),
-    ]
-    rows = np.concatenate([*columns, *(part.reshape(count, -1) for part in parts)], axis=1)
-    start, span, *rest = row_at(ops, t, starts, np.ascontiguousarray(rows, dtype=float))
-    table = [rest[6 * k : 6 * k + 6] for k in range(n)]
-    entries = rest[6 * n :]
-    if group.is_complex:
-        entries = [Complex(re, im) for re, im in zip(entries[: d * d], entries[d * d :], strict=True)]
-    return start, span, table, [entries[d * i : d * i + d] for i in range(d)]
+def _segments(reference: WaypointReference) -> TimeTable:
+    """Start, duration, coefficients and first waypoint of every segment: 1, 1, 6 n, and d^2 numbers, twice as many of a complex group."""
+    starts, X = reference.times[:-1], reference.elements[:-1]
+    parts = [X.real, X.imag] if reference.group.is_complex else [X]
+    columns = [starts[:, None], np.diff(reference.times)[:, None], np.moveaxis(reference.coefficients, 1, 2), *parts]
+    rows = np.concatenate([each.reshape(len(starts), -1) for each in columns], axis=1)
+    return TimeTable(starts, np.ascontiguousarray(rows, dtype=float))
 
 
 def _from_left(ops: Arithmetic, start: NDArray[Any] | None, X: Matrix) -> Any:

@@ -88,10 +88,7 @@ def _relative_logs(derivation: GroupDerivation, X: NDArray[Any], pairs: Sequence
     library, (first, second) = library_of(derivation.group), np.transpose(pairs)
     relative = np.linalg.solve(X[first], X[second])
     x = np.asarray(library.log.batch(relative))
-    off = np.max(np.abs(np.asarray(library.exp.batch(x)) - relative), axis=(1, 2), initial=0.0)
-    turn = np.max(np.abs(np.linalg.eigvals(derivation.group.hat(np.nan_to_num(x))).imag), axis=1)
-    good = (off <= _ON_GROUP * np.maximum(1.0, np.max(np.abs(relative), axis=(1, 2)))) & (turn <= _SHORT_WAY)
-    for k in np.flatnonzero(~good):
+    for k in np.flatnonzero(~_is_the_way(derivation.group, x, np.asarray(library.exp.batch(x)), relative)):
         i, j = pairs[int(k)]
         x[k] = _relative_log(derivation, X[i], X[j], min(i, j))
     return x
@@ -102,13 +99,17 @@ def logarithm(derivation: GroupDerivation, X: NDArray[Any]) -> NDArray[Any] | No
     ops = FloatArithmetic()
     try:
         x = np.array(log_coordinates(ops, derivation, _scalars(X)), dtype=float)
-        off = float(np.max(np.abs(_numbers(exp_matrix(ops, derivation, x.tolist())) - X)))
+        found = _numbers(exp_matrix(ops, derivation, x.tolist()))
     except (ArithmeticError, ValueError):
         return None
-    turn = float(np.max(np.abs(np.linalg.eigvals(derivation.group.hat(x)).imag)))
-    if turn > _SHORT_WAY:
-        return None
-    return x if off <= _ON_GROUP * max(1.0, float(np.max(np.abs(X)))) else None
+    return x if _is_the_way(derivation.group, x, found, X) else None
+
+
+def _is_the_way(group: MatrixGroup, x: NDArray[Any], found: NDArray[Any], X: NDArray[Any]) -> Any:
+    """Whether exp(hat x), which is `found`, is X, and no turn is as short the other way round; of one or of many. False for NaN."""
+    off, size = (np.max(np.abs(each), axis=(-2, -1)) for each in (found - X, X))
+    turn = np.max(np.abs(np.linalg.eigvals(group.hat(np.nan_to_num(x))).imag), axis=-1)
+    return (off <= _ON_GROUP * np.maximum(1.0, size)) & (turn <= _SHORT_WAY)
 
 
 def _scalars(X: NDArray[Any]) -> list[list[Any]]:

@@ -34,12 +34,7 @@ class RealMatrices:
     @cached_property
     def varying(self) -> frozenset[tuple[int, int]]:
         """Entries (i, j) that are not those of the identity in every element: the closure of the basis' own pattern."""
-        reach = {(i, j) for m in self.basis for i in range(self.size) for j in range(self.size) if m[i, j] != 0}
-        while True:
-            longer = {(i, k) for (i, j) in reach for (other, k) in reach if j == other} | reach
-            if longer == reach:
-                return frozenset(reach)
-            reach = longer
+        return reached({(i, j) for m in self.basis for i in range(self.size) for j in range(self.size) if m[i, j] != 0})
 
     @cached_property
     def blocks(self) -> tuple[tuple[tuple[int, ...], bool], ...]:
@@ -107,6 +102,16 @@ class RealMatrices:
 
     def _traceless(self, block: list[int]) -> bool:
         return all(sp.expand(sum(m[i, i] for i in block)) == 0 for m in self.basis)
+
+
+def reached(places: set[tuple[int, int]]) -> frozenset[tuple[int, int]]:
+    """Where products of matrices with these entries may be other than zero."""
+    reach = places
+    while True:
+        longer = {(i, k) for (i, j) in reach for (other, k) in reach if j == other} | reach
+        if longer == reach:
+            return frozenset(reach)
+        reach = longer
 
 
 def real_form(matrix: sp.MatrixBase, is_complex: bool) -> sp.MatrixBase:

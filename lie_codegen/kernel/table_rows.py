@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,43 @@ from lie_codegen.on_demand import casadi as ca
 _FROM = 13
 
 
-def row_at(ops: Arithmetic, t: Scalar, begins: Array, rows: Array) -> list[Scalar]:
-    """The last of the (k, w) rows whose time in (k,) is below t; the first before all of them."""
-    if len(rows) >= _FROM and getattr(ops, "routines", False):
-        return call_routine(ops, _table(begins, rows), [t])
-    later = [ops.less(float(begin), t) for begin in begins[1:]]
-    return [_chosen(ops, later, column) for column in rows.T]
+@dataclass(frozen=True, eq=False)
+class TimeTable:
+    """Rows of numbers that begin at increasing times.
+
+    Attributes:
+        begins: (k,) times.
+        rows: (k, w).
+    """
+
+    begins: Array
+    rows: Array
+
+    def at(self, ops: Arithmetic, t: Scalar) -> list[Scalar]:
+        """The last row whose time is below t; the first before all of them."""
+        if len(self.rows) >= _FROM and getattr(ops, "routines", False):
+            return call_routine(ops, self._routine, [t])
+        later = [ops.less(float(begin), t) for begin in self.begins[1:]]
+        return [_chosen(ops, later, column) for column in self.rows.T]
+
+    @cached_property
+    def _routine(self) -> Routine:
+        """Made once: a thousand rows are tens of thousands of numbers as text."""
+        begins, rows = self.begins, self.rows
+        digest = hashlib.sha256(begins.tobytes() + rows.tobytes()).hexdigest()[:16]
+        literals = tuple(tuple(map(repr, row)) for row in rows.tolist())
+        settings = (("width", rows.shape[1]), ("begins", tuple(map(repr, begins.tolist()))), ("rows", literals))
+        return Routine(
+            f"table_{digest}",
+            1,
+            rows.shape[1],
+            "table_row.c.jinja",
+            settings,
+            (),
+            partial(_looked_up, begins, rows),
+            _steady,
+            graph=partial(_graph, begins, rows),
+        )
 
 
 def _chosen(ops: Arithmetic, later: Sequence[Any], values: Array) -> Scalar:
@@ -37,23 +69,6 @@ def _chosen(ops: Arithmetic, later: Sequence[Any], values: Array) -> Scalar:
     for condition, value in zip(later, values[1:], strict=True):
         result = ops.where(condition, float(value), result)
     return result
-
-
-def _table(begins: Array, rows: Array) -> Routine:
-    digest = hashlib.sha256(begins.tobytes() + rows.tobytes()).hexdigest()[:16]
-    literals = tuple(tuple(map(repr, row)) for row in rows.tolist())
-    settings = (("width", rows.shape[1]), ("begins", tuple(map(repr, begins.tolist()))), ("rows", literals))
-    return Routine(
-        f"table_{digest}",
-        1,
-        rows.shape[1],
-        "table_row.c.jinja",
-        settings,
-        (),
-        partial(_looked_up, begins, rows),
-        _steady,
-        graph=partial(_graph, begins, rows),
-    )
 
 
 def _looked_up(begins: Array, rows: Array, values: Sequence[float]) -> Array:

@@ -14,7 +14,7 @@ import lie_codegen as lc
 from lie_codegen.kernel.arithmetic import Arithmetic, FloatArithmetic
 from lie_codegen.kernel.casadi_arithmetic import function_of
 from lie_codegen.kernel.kernel import Kernel, Port
-from lie_codegen.kernel.table_rows import row_at
+from lie_codegen.kernel.table_rows import TimeTable
 
 RNG = np.random.default_rng(4)
 BEGINS = np.concatenate([[0.0], np.cumsum(RNG.uniform(0.01, 1, 39))])
@@ -23,8 +23,10 @@ TIMES = [-1.0, *BEGINS, *(BEGINS + 1e-9), *RNG.uniform(0, 25, 50), 1e9]
 
 
 def kernel(count: int = 40) -> Kernel:
+    table = TimeTable(BEGINS[:count], ROWS[:count])
+
     def body(ops: Arithmetic, t: Any) -> tuple[Any, ...]:
-        begin, *row = row_at(ops, t, BEGINS[:count], ROWS[:count])
+        begin, *row = table.at(ops, t)
         return ([*row, (t - begin) * row[0]],)
 
     return Kernel("row", "table", (Port("t", ()),), (Port("x", (5,)),), body, sampler=lambda rng: (rng.uniform(0, 20),))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from lie_codegen.exact.exponential import MatrixExponential
 from lie_codegen.exact.numbers import domain_matrix
-from lie_codegen.groups.matrix_pattern import RealMatrices
+from lie_codegen.groups.matrix_pattern import RealMatrices, reached
 from lie_codegen.groups.wei_norman.exponential_entries import ExponentialEntries
 from lie_codegen.groups.wei_norman.products import times_matrix
 from lie_codegen.kernel.arithmetic import Arithmetic, Scalar
@@ -60,12 +60,7 @@ class Conjugation:
 
 def places(ad: sp.MatrixBase) -> frozenset[tuple[int, int]]:
     """Where exp(x ad) may be other than zero."""
-    reach = {(i, i) for i in range(ad.rows)} | set(ad.todok())
-    while True:
-        longer = reach | {(i, k) for (i, j) in reach for (other, k) in reach if j == other}
-        if longer == reach:
-            return frozenset(reach)
-        reach = longer
+    return reached({(i, i) for i in range(ad.rows)} | set(ad.todok()))
 
 
 def is_involved(ad: sp.MatrixBase) -> bool:

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from lie_codegen.groups.matrix_group import MatrixGroup
-from lie_codegen.on_demand import sympy as sp
 
 if TYPE_CHECKING:
     from lie_codegen.exact.exponential import MatrixExponential
@@ -62,12 +61,4 @@ class WeiNormanData:
         """exp(x A_k) for each k; a complex A_k in its real form [[Re, -Im], [Im, Re]]."""
         from lie_codegen.exact.exponential import matrix_exponential
 
-        return tuple(matrix_exponential(_real_form(self.group, k)) for k in range(self.group.dim))
-
-
-def _real_form(group: MatrixGroup, k: int) -> sp.MatrixBase:
-    matrix = group.exact_basis[k]
-    if not group.is_complex:
-        return matrix
-    re, im = matrix.applyfunc(sp.re), matrix.applyfunc(sp.im)
-    return sp.Matrix.vstack(sp.Matrix.hstack(re, -im), sp.Matrix.hstack(im, re))
+        return tuple(matrix_exponential(matrix) for matrix in self.real.basis)
